@@ -12,7 +12,7 @@ from jaxtyping import Int
 from pns_common.creases import Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.report import LevelReport
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.topology import EdgeClass
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
@@ -43,7 +43,7 @@ def count_bends(
     """
     if creases.named is None:
         return [NO_BENDS] * parts
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
     sharp = creases.applied(mesh.vertices, topology).edge_class[bent] == EdgeClass.CREASE
     part = np.zeros(len(bent), dtype=np.int64)

@@ -13,7 +13,7 @@ MAX_LEVELS = 6
 # The library's, without its import (tests hold them equal).
 DEFAULT_LEVELS = 2
 
-SchemeName = Literal["pns", "loop"]
+SchemeName = Literal["auto", "pns", "loop", "catmull-clark"]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
 NormalRule = Literal["auto", "keep", "smooth", "limit"]
@@ -40,7 +40,7 @@ class Options:
     """
 
     levels: int = DEFAULT_LEVELS
-    scheme: SchemeName = "pns"
+    scheme: SchemeName = "auto"
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
     diagnostics: Diagnostics = "summary"
@@ -88,6 +88,11 @@ class Options:
             )
         if self.weld_tolerance and self.weld != "position":
             raise InvalidParameter("weld_tolerance", "weld_tolerance needs weld=position")
+
+    @property
+    def learns(self) -> bool:
+        """Whether a model is asked for, if only for meshes of triangles."""
+        return self.scheme in ("auto", "pns")
 
     @property
     def selects(self) -> bool:

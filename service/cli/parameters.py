@@ -51,7 +51,10 @@ def _reference_length(text: str) -> float | Literal["auto"]:
 LevelsOption = Annotated[
     int, typer.Option(help=f"depth, 1 to {MAX_LEVELS}: four faces of one at each level")
 ]
-SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
+SchemeOption = Annotated[
+    SchemeName,
+    typer.Option(help="the rules; auto: pns for triangles, catmull-clark for polygons"),
+]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
 ModelOption = Annotated[
     str | None,

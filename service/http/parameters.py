@@ -56,7 +56,9 @@ class Parameters(BaseModel):
     )
     scheme: SchemeName = Field(
         default=DEFAULTS.scheme,
-        description="`loop` is the same path without the learned correction",
+        description="`auto`: `pns` for files of triangles, `catmull-clark` for OBJ, PLY and OFF "
+        "files with polygons; `pns` and `loop` cut polygons into triangles, and `loop` is without "
+        "the learned correction",
     )
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,

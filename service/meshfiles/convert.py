@@ -20,6 +20,7 @@ from pns_common.columns import SubdivisionMatrix
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.model.session import Model
+from pns_common.schemes import Scheme
 
 from ..bodies.folder import folder_of
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
@@ -28,15 +29,20 @@ from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import Media, read_upload
-from ..gltf.subdivide import make_scheme, subdivide_gltf
+from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
 from .flatten import flatten
 from .formats import FORMATS, held
-from .refine_mesh_file import check_cost, refine_mesh_file
+from .mesh_file import NORMAL, MeshFile
+from .parts import with_group_normals
+from .polygons import refine_polygons
+from .polygons_glb import polygons_glb
+from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
 from .to_gltf import as_gltf, read_within
 from .triangles_glb import as_gltf_json
+from .triangulate import triangulated
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -91,7 +97,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
 
     planned = _planned(jobs)
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
-    loaded = load_model(model) if options.scheme == "pns" or model is not None else None
+    loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     for job in planned:
         try:
@@ -212,9 +218,14 @@ def converted(
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
     course = Course() if course is None else course
-    if kind in GLTF_KINDS or target in GLTF_KINDS:
+    if kind not in GLTF_KINDS:
+        with course.stage("read", 0.0, 0.1):
+            mesh, polygons = _taken(read_within(data, kind, limits), options, model)
+    if kind in GLTF_KINDS or (target in GLTF_KINDS and polygons is None):
         # Kinds are checked where they come from.
-        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), options, limits)
+        sent = Sent(data, cast(Kind, kind), siblings)
+        if kind not in GLTF_KINDS:
+            sent = as_gltf(mesh, siblings, options)
         done = subdivide_gltf(
             sent.data,
             cast(Media, sent.kind),
@@ -226,14 +237,22 @@ def converted(
             sent.losses,
             sent.parts,
         )
-        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
-    with course.stage("read", 0.0, 0.1):
-        mesh = read_within(data, kind, limits)
+        written = _of_gltf(done.glb, done.report, target, limits)
+        return replace(written, seconds=done.timings, faces_in=done.faces_in)
+    if target in GLTF_KINDS:
+        mesh = with_group_normals(mesh)
+        if NORMAL not in mesh.layers and options.normals == "auto":
+            options = replace(options, normals="smooth")
     with course.part(0.1, 0.8):
-        refined, report = refine_mesh_file(
-            mesh, make_scheme(options, model), options, limits, course, traced=traced
+        scheme = make_scheme(options, model) if polygons is None else polygons
+        refined, report = (refine_mesh_file if polygons is None else refine_polygons)(
+            mesh, scheme, options, limits, course, traced=traced
         )
     with course.stage("write", 0.8, 1.0):
+        if target in GLTF_KINDS:
+            glb, report = polygons_glb(refined, report, options, limits, siblings)
+            written = _of_gltf(glb, report, target, limits)
+            return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
         kept, changes = held(refined, target)
         if options.compress != "none":
             changes.append(Change("", "not compressed: only a glTF is", 1))
@@ -243,10 +262,26 @@ def converted(
         written = Written(
             FORMATS[target].write(kept),
             _with_changes(report, changes),
-            len(kept.faces),
+            len(kept.sizes),
             parents=parents,
         )
-    return replace(written, seconds=course.seconds)
+    return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
+
+
+def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:
+    """Return a file's mesh, and the scheme that refines its polygons; None: it is of triangles."""
+    flat = bool((mesh.sizes == 3).all())
+    if options.scheme == "catmull-clark" or not flat:
+        scheme = polygon_scheme(options, model)
+        wants = [name for name in ("limit", "material", "group") if getattr(options, name)]
+        if scheme is not None and not wants:
+            return mesh, scheme
+        if options.scheme == "catmull-clark":
+            raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
+        if scheme is not None:
+            told = Change("", f"polygons cut into triangles, which {wants[0]} needs", 1)
+            mesh = replace(mesh, changes=(*mesh.changes, told))
+    return triangulated(mesh), None
 
 
 def predicted_faces(
@@ -262,7 +297,7 @@ def predicted_faces(
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
     mesh = read_within(data, kind, limits)
     check_cost(mesh, options, limits)
-    return len(mesh.faces) * 4**options.levels
+    return faces_after(mesh, options.levels)
 
 
 def lines_of(report: dict[str, Any]) -> Iterator[str]:
@@ -313,6 +348,7 @@ class Written:
 
     Attributes:
         content, report, faces: its bytes, its report, how many faces it has.
+        faces_in: how many the input has.
         seconds: what each stage took.
         parents: the vertices of the input that each of its vertices is made of, if asked for.
     """
@@ -321,6 +357,7 @@ class Written:
     report: dict[str, Any]
     faces: int
     seconds: dict[str, float] = field(default_factory=dict)
+    faces_in: int = 0
     parents: SubdivisionMatrix | None = None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
 from pns_common.columns import SubdivisionMatrix
-from pns_common.rows import cross, distinct_rows, marked, number_by_first_appearance, unit
+from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
 
 from ..gltf.constants import FLOAT
 from ..gltf.read.primitives import TrianglePrimitive
@@ -33,6 +33,7 @@ from .mesh_file import (
     MeshFile,
     of_triangles,
 )
+from .triangulate import area_vectors
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 LARGEST = float(np.finfo(np.float32).max)
@@ -169,14 +170,12 @@ def with_group_normals(mesh: MeshFile) -> MeshFile:
     smooth = np.array([name.lower() not in _SMOOTH_OFF for name in groups.names] + [False])
     if not smooth.any():
         return mesh
-    faces, of_face = mesh.faces, groups.of_face
-    points = distinct_rows(canonical_zero(mesh.vertices))[faces]
-    label = np.where(smooth[of_face], of_face, len(groups.names) + np.arange(len(faces)))
-    corner = distinct_rows(np.stack([points.reshape(-1), np.repeat(label, 3)], axis=1))
-    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
-    by_area = cross(b - a, c - a)
-    count = int(corner.max()) + 1
-    sums = [np.bincount(corner, np.repeat(axis, 3), minlength=count) for axis in by_area.T]
+    of_face, sizes = groups.of_face, mesh.sizes
+    points = distinct_rows(canonical_zero(mesh.vertices))[mesh.corners]
+    label = np.where(smooth[of_face], of_face, len(groups.names) + np.arange(len(sizes)))
+    corner = distinct_rows(np.stack([points, np.repeat(label, sizes)], axis=1))
+    by_area, count = area_vectors(mesh), int(corner.max()) + 1
+    sums = [np.bincount(corner, np.repeat(axis, sizes), minlength=count) for axis in by_area.T]
     return replace(mesh, layers={**mesh.layers, NORMAL: Layer(unit(np.stack(sums, 1)), corner)})
 
 

@@ -96,9 +96,16 @@ def refine_mesh_file(
     return refined, build_report(scheme, options.levels, [result], unused, changes)
 
 
+def faces_after(mesh: MeshFile, levels: int) -> int:
+    """Return how many faces a mesh file becomes: four of a triangle, a quad for each corner."""
+    if (mesh.sizes == 3).all():
+        return len(mesh.sizes) * 4**levels
+    return len(mesh.corners) * 4 ** (levels - 1)
+
+
 def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
     """Check the refined faces and the memory that they will take. Raises LimitError."""
-    faces = len(mesh.faces) * 4**options.levels
+    faces = faces_after(mesh, options.levels)
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit

@@ -88,7 +88,7 @@ def subdivide(work: Work) -> Done:
 
     with Reporter(work.page) as reporter, job_memory(work.limits):
         sent = uploads.sent(_body_of(work), work.content_type, work.limits)
-        model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
+        model = _MODELS.get(work.model) if work.options.learns else None
         course = Course(begins=reporter.stage, moves=reporter.reach)
         written = converted(
             sent.data,
@@ -106,12 +106,11 @@ def subdivide(work: Work) -> Done:
             memory_file.write(work.report, report)
         if work.answer is not None:
             memory_file.write(work.answer, written.content)
-    faces = written.report["totals"]["faces"]
     return Done(
         written.seconds,
         None if model is None else model.name,
-        faces_in=faces // 4**work.options.levels,
-        faces=faces,
+        faces_in=written.faces_in,
+        faces=written.report["totals"]["faces"],
     )
 
 
@@ -147,7 +146,7 @@ def _learned_levels(work: Work) -> int:
     """Return at how many levels a model acts: all in format 1, one in format 4."""
     from pns_common.model.card import PAPER_FORMAT
 
-    if work.options.scheme != "pns":
+    if not work.options.learns:
         return 0
     try:
         card = _MODELS.get(work.model).card

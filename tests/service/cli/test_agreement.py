@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -72,6 +72,21 @@ def range_of(made: MeshFile) -> Any:
     return (made.corners * 0 + 1).cumsum() - 1
 
 
+def quads() -> MeshFile:
+    """The box, its triangles joined in pairs."""
+    made = mesh()
+    pairs = (np.arange(len(made.corners)).reshape(-1, 6)[:, [0, 1, 2, 5]]).reshape(-1)
+    corners = made.corners.reshape(-1, 6)
+    assert (corners[:, [0, 2]] == corners[:, [3, 4]]).all()
+    return replace(
+        made,
+        offsets=made.offsets[: len(pairs) // 4 + 1] // 3 * 4,
+        corners=made.corners[pairs],
+        layers={name: Layer(own.values, own.rows[pairs]) for name, own in made.layers.items()},
+        labels={kind: Labels(own.names, own.of_face[::2]) for kind, own in made.labels.items()},
+    )
+
+
 def content(kind: str) -> bytes:
     if kind not in ("glb", "gltf"):
         return formats.write(mesh(), kind)
@@ -97,12 +112,14 @@ def test_every_option_is_tried() -> None:
 
 
 @pytest.mark.spawning
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, "quads"])
 def test_each_option_gives_the_same_bytes_by_command_and_service(
     pns: Any, tmp_path: Path, client: TestClient, kind: str
 ) -> None:
+    data = formats.write(quads(), "obj") if kind == "quads" else content(kind)
+    kind = "obj" if kind == "quads" else kind
     source = tmp_path / f"in.{kind}"
-    source.write_bytes(content(kind))
+    source.write_bytes(data)
     for name, chosen in [("", {}), *CHOSEN.items()]:
         query = {key: str(value).lower() for key, value in chosen.items()}
         answer = client.post(
