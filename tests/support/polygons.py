@@ -102,9 +102,8 @@ def polygon_soups(draw, repeats=True):
     count = draw(st.integers(4, 12))
     faces = []
     for _ in range(draw(st.integers(1, 16))):
-        degree = int(rng.integers(3, 7))
-        whole = repeats or degree > count
-        faces.append(rng.choice(count, degree, replace=whole).tolist())
+        degree = int(rng.integers(3, 7 if repeats else min(7, count + 1)))
+        faces.append(rng.choice(count, degree, replace=repeats).tolist())
     vertices = rng.standard_normal((count, 3))
     if draw(st.booleans()):
         vertices = np.round(vertices)  # coincident points, no area
