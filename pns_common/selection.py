@@ -24,7 +24,7 @@ SIDES = 3
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """What is left of a refined mesh.
+    """A refined mesh without what refines faces that were not chosen.
 
     Attributes:
         faces: (G, 3) its faces, by `vertices`.

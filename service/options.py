@@ -91,12 +91,12 @@ class Options:
 
     @property
     def learns(self) -> bool:
-        """Whether a model is asked for, if only for meshes of triangles."""
+        """True if a model is asked for, if only for meshes of triangles."""
         return self.scheme in ("auto", "pns")
 
     @property
     def selects(self) -> bool:
-        """Whether some faces are refined alone."""
+        """True if some faces are refined alone."""
         return self.material is not None or self.group is not None
 
     @property

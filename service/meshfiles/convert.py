@@ -218,27 +218,15 @@ def converted(
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
     course = Course() if course is None else course
-    if kind not in GLTF_KINDS:
-        with course.stage("read", 0.0, 0.1):
-            mesh, polygons = _taken(read_within(data, kind, limits), options, model)
-    if kind in GLTF_KINDS or (target in GLTF_KINDS and polygons is None):
+    if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
         sent = Sent(data, cast(Kind, kind), siblings)
-        if kind not in GLTF_KINDS:
-            sent = as_gltf(mesh, siblings, options)
-        done = subdivide_gltf(
-            sent.data,
-            cast(Media, sent.kind),
-            options,
-            model,
-            limits,
-            course,
-            sent.siblings,
-            sent.losses,
-            sent.parts,
-        )
-        written = _of_gltf(done.glb, done.report, target, limits)
-        return replace(written, seconds=done.timings, faces_in=done.faces_in)
+        return _by_gltf(sent, target, options, model, limits, course)
+    with course.stage("read", 0.0, 0.1):
+        mesh, polygons = _taken(read_within(data, kind, limits), options, model)
+    if target in GLTF_KINDS and polygons is None:
+        sent = as_gltf(mesh, siblings, options)
+        return _by_gltf(sent, target, options, model, limits, course)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
         if NORMAL not in mesh.layers and options.normals == "auto":
@@ -266,6 +254,30 @@ def converted(
             parents=parents,
         )
     return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
+
+
+def _by_gltf(
+    sent: Sent,
+    target: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course,
+) -> Written:
+    """Refine a glTF into a file of `target`."""
+    done = subdivide_gltf(
+        sent.data,
+        cast(Media, sent.kind),
+        options,
+        model,
+        limits,
+        course,
+        sent.siblings,
+        sent.losses,
+        sent.parts,
+    )
+    written = _of_gltf(done.glb, done.report, target, limits)
+    return replace(written, seconds=done.timings, faces_in=done.faces_in)
 
 
 def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:

@@ -24,7 +24,7 @@ Chosen = Sequence[Bool[np.ndarray, " F"]]
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """How the kept faces of a mesh are cut.
+    """A cut of the kept faces of a mesh.
 
     Attributes:
         kind: (P,) which sides are split, as in `transitions`; ALL: the face is refined.

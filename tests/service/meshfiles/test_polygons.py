@@ -32,7 +32,8 @@ def cube(behind: str = "") -> bytes:
 
 
 def made(data: bytes, kind: str, target: str, **options: Any) -> Written:
-    return converted(data, kind, target, Options(**{"levels": 1} | options), None, Limits())
+    given: dict[str, Any] = {"levels": 1} | options
+    return converted(data, kind, target, Options(**given), None, Limits())
 
 
 @pytest.mark.parametrize("target", ["obj", "ply", "off"])
