@@ -16,9 +16,9 @@ import msgspec
 import numpy as np
 
 from pns_common import load_model
-from pns_common.columns import SubdivisionMatrix
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.model.session import Model
 from pns_common.schemes import Scheme
 
@@ -285,7 +285,7 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
     flat = bool((mesh.sizes == 3).all())
     if options.scheme == "catmull-clark" or not flat:
         scheme = polygon_scheme(options, model)
-        wants = [name for name in ("limit", "material", "group") if getattr(options, name)]
+        wants = [name for name in ("material", "group") if getattr(options, name)]
         if scheme is not None and not wants:
             return mesh, scheme
         if options.scheme == "catmull-clark":

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from pns_common.columns import SubdivisionMatrix
+from pns_common.matrix import SubdivisionMatrix
 
 from ..report import Change
 

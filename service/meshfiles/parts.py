@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common.columns import SubdivisionMatrix
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
 
 from ..gltf.constants import FLOAT

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.columns import SubdivisionMatrix, level_topologies
+from pns_common.columns import level_topologies
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine, refine_many

@@ -10,7 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool
 
-from pns_common.columns import SubdivisionMatrix
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.progress import LEARNED_COST
 from pns_common.report import Report
 from pns_common.schemes import Scheme

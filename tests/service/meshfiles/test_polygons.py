@@ -108,8 +108,8 @@ def test_each_scheme_takes_polygons_as_it_says() -> None:
     assert counts == {"auto": 24, "pns": 48, "loop": 48, "catmull-clark": 24}
     triangles = made(cube(), "obj", "obj", scheme="loop").content
     assert made(triangles, "obj", "obj", scheme="catmull-clark").faces == 3 * 48
-    with pytest.raises(InvalidParameter, match="limit"):
-        made(cube(), "obj", "obj", scheme="catmull-clark", limit=True)
+    with pytest.raises(InvalidParameter, match="material"):
+        made(cube(), "obj", "obj", scheme="catmull-clark", material="m0")
     glb = made(cube(), "obj", "glb").content
     with pytest.raises(InvalidParameter, match="catmull-clark"):
         made(glb, "glb", "glb", scheme="catmull-clark")
