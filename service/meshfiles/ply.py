@@ -286,7 +286,7 @@ def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
 
 @dataclass(frozen=True)
 class _Store:
-    """Where numbers lie, and how they are read: words of a text, or bytes.
+    """Numbers to be read: words of a text, or bytes.
 
     Attributes:
         begin, end: the places of the first number and behind the last.
