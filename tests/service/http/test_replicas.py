@@ -15,26 +15,31 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx2
 import pytest
 
-from service.http.jobs.store import ANSWER, JobStore
+from service.http.jobs.shared import SharedJobs
+from service.http.jobs.store import ANSWER, BODY, JobStore
 from service.settings import Settings
 from tests.support.live import served
 from tests.support.proxy import free_port
 
 GLB = {"Content-Type": "model/gltf-binary"}
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
-# A replica whose workers do what their bodies say.
+# A replica whose workers do what their bodies say, and whose death is noticed within two seconds.
 REPLICA = """
 from service import log_lines
 from service.http.app import create_app
+from service.http.jobs import shared, store
 from service.http.server import DrainingServer
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 
 if __name__ == "__main__":
+    store.BEAT_SECONDS = shared.BEAT_SECONDS = 0.3
+    store.LEASE_SECONDS = shared.LEASE_SECONDS = 2.0
     log_lines.configure()
     settings = Settings()
     stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
@@ -233,6 +238,52 @@ def test_a_job_that_ends_while_orphans_are_looked_for_keeps_its_result(
         assert record.view == {"state": "done"}
         assert await store.file(ANSWER, "ended") == b"answer"
         await store.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_job_whose_file_is_gone_has_failed(redis: str) -> None:
+    """Its replica died, and the store has lost what was sent: nobody waits for it in vain."""
+    shared = redis.removesuffix("0") + "2"
+
+    view = {"state": "queued", "format": "glb"}
+
+    async def lose_one() -> None:
+        store = JobStore(Settings(store=shared))
+        await store.create("lost", None, {"request_id": "mine"}, view, b"body")
+        await store._files.delete(f"{BODY}:lost")
+        await store.release("lost")
+        await store.close()
+
+    asyncio.run(lose_one())
+    with served(workers=1, store=shared) as where, opened(where) as client:
+        problem = ended(client, "/jobs/lost")["problem"]
+        assert (problem["code"], problem["request_id"]) == ("store-unavailable", "mine")
+        answer = client.get("/jobs/lost/result")
+        assert (answer.status_code, answer.json()) == (503, problem)
+        assert answer.headers["retry-after"] == "1"
+
+
+def test_a_job_that_cannot_be_taken_over_keeps_no_other_from_it(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    looked = asyncio.Event()
+
+    async def adopt(*_: object) -> bool:
+        if "no options" in caplog.text:
+            looked.set()
+            return False
+        raise TypeError("no options")
+
+    monkeypatch.setattr("service.http.jobs.shared.LEASE_SECONDS", 0.04)
+    monkeypatch.setattr(SharedJobs, "_adopt", adopt)
+    service = SimpleNamespace(admission=SimpleNamespace(draining=False))
+
+    async def scenario() -> None:
+        shared = SharedJobs(None, dict, print)  # type: ignore[arg-type]
+        adopting = asyncio.create_task(shared.adopt_for_ever(service))  # type: ignore[arg-type]
+        await asyncio.wait_for(looked.wait(), 10)
+        adopting.cancel()
 
     asyncio.run(scenario())
 
