@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from service.http.app import create_app
-from service.http.docs_page import FILES, FOLDER
-from service.http.static_files import MEDIA_TYPES
+from service.http.pages import DOCS as FOLDER
+from service.http.pages import DOCS_FILES as FILES
+from service.http.pages import MEDIA_TYPES
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
@@ -51,7 +52,7 @@ def test_a_file_that_is_known_is_not_sent_again(client):
     assert plain.content == first.content == (FOLDER / "swagger-ui.css").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["LICENSE", "none", "..%2fdocs_page.py", "%2e%2e/docs_page.py"])
+@pytest.mark.parametrize("name", ["LICENSE", "none", "..%2fpages.py", "%2e%2e/pages.py"])
 def test_nothing_else_is_served(client, name):
     assert client.get(f"/docs/{name}").status_code == 404
 

@@ -9,14 +9,13 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from service.http import page
 from service.http.app import create_app
-from service.http.static_files import MEDIA_TYPES
+from service.http.pages import MEDIA_TYPES, PAGE, PAGE_POLICY
 from service.settings import Settings
 from tests.support.live import local
 
 CLIENT = local(create_app(Settings(workers=1)))
-ASSETS = sorted((page.FOLDER / "assets").iterdir())
+ASSETS = sorted((PAGE / "assets").iterdir())
 ADDRESS = re.compile(r'(?:src|href)="([^"#]+)"')
 
 
@@ -53,11 +52,11 @@ def test_every_file_comes_with_the_policy_and_its_type(path: str) -> None:
 
 
 def test_the_policy_lets_in_no_inline_script_and_no_foreign_address() -> None:
-    directives = dict(part.split(" ", 1) for part in page.POLICY.split("; "))
+    directives = dict(part.split(" ", 1) for part in PAGE_POLICY.split("; "))
     assert directives["default-src"] == directives["frame-ancestors"] == "'none'"
     assert directives["script-src"] == "'self' 'wasm-unsafe-eval'"
     assert directives["connect-src"] == "'self' blob:"
-    assert not re.search(r"https?:|\*|unsafe-inline|'unsafe-eval'", page.POLICY)
+    assert not re.search(r"https?:|\*|unsafe-inline|'unsafe-eval'", PAGE_POLICY)
 
 
 def test_the_page_is_asked_for_again_and_its_assets_never() -> None:
@@ -91,7 +90,7 @@ def test_a_client_that_takes_gzip_gets_it(accepted: str, packed: bool) -> None:
         assert (answer.headers.get("Content-Encoding") == "gzip") is packed
         sent = b"".join(answer.iter_raw())
     content = gzip.decompress(sent) if packed else sent
-    assert content == (page.FOLDER / "index.html").read_bytes()
+    assert content == (PAGE / "index.html").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -119,7 +118,7 @@ def test_the_first_visit_loads_less_than_350_kb() -> None:
             needed.add(name)
             waiting += re.findall(r'(?:from|import)"\./([^"]+\.js)"', text[name])
     needed |= {path.name for path in ASSETS if path.suffix in (".css", ".svg")}
-    sizes = [len(gzip.compress((page.FOLDER / "assets" / name).read_bytes())) for name in needed]
-    index = len(gzip.compress((page.FOLDER / "index.html").read_bytes()))
+    sizes = [len(gzip.compress((PAGE / "assets" / name).read_bytes())) for name in needed]
+    index = len(gzip.compress((PAGE / "index.html").read_bytes()))
     assert len(needed) > 3
     assert sum(sizes) + index < 350_000
