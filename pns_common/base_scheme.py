@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.topology import Topology, split_faces
 
 Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]
 
@@ -32,6 +32,9 @@ class BaseScheme:
         name: its name in reports and on model cards.
         place: applies the masks of one level to any columns: rows of old vertices, then new ones.
         split: splits the faces.
+        faces: returns the faces of the split alone, in the order of ``split``.
+        polygons: whether it splits faces of any degree, into a quad for each corner; else it splits
+            triangles in four.
         limit_weight: of a smooth vertex of valence k, the weight of its neighbours' mean in the
             limit mask; the learned rule's prior is made of it. None for schemes without one.
     """
@@ -39,6 +42,8 @@ class BaseScheme:
     name: str
     place: Place = field(repr=False)
     split: Split = field(repr=False)
+    faces: Callable[..., Integer[np.ndarray, "C N"]] = field(default=split_faces, repr=False)
+    polygons: bool = field(default=False, repr=False)
     limit_weight: Callable[[Integer[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
         default=None, repr=False
     )

@@ -114,4 +114,4 @@ def _kept_betas() -> Float[np.ndarray, " K"]:
     return beta(np.arange(KEPT))
 
 
-LOOP = BaseScheme("loop", place, split_triangles, limit_ring_weight)
+LOOP = BaseScheme("loop", place, split_triangles, limit_weight=limit_ring_weight)
