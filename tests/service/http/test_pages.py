@@ -125,8 +125,7 @@ def test_the_first_visit_loads_less_than_350_kb() -> None:
 
 
 def test_the_description_and_all_that_it_names_are_there() -> None:
-    page = CLIENT.get("/docs")
-    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', page.text)
+    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', CLIENT.get("/docs").text)
     assert len(named) == 4
     for path in named:
         assert CLIENT.get(f"/{path}").status_code == 200, path
@@ -137,8 +136,7 @@ def test_in_the_description_nothing_of_another_host_may_run(name: str) -> None:
     answer = CLIENT.get("/docs" if name == "index.html" else f"/docs/{name}")
     policy = answer.headers["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self';")
-    assert "unsafe" not in policy
-    assert "http" not in policy
+    assert not re.search("unsafe|http", policy)
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert answer.headers["content-type"] == MEDIA_TYPES[Path(name).suffix]
 
