@@ -118,7 +118,7 @@ class ColumnRefinement:
         values = np.asarray(columns, dtype=np.float64)
         for topology in self.topologies:
             values = self.base.place(values, topology, self.blocks)
-        return limit_positions(values, self.last, self.blocks) if self.limit else values
+        return limit_positions(values, self.last, self.blocks, self.base) if self.limit else values
 
 
 @dataclass(frozen=True, eq=False)

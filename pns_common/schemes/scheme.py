@@ -103,10 +103,11 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         card.orientation == "symmetric",
         card.gate_sharpness,
         budget,
+        feature_type=getattr(model, "feature_type", np.float64),
     )
     if card.format == PAPER_FORMAT:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
-    if card.base not in BASES or BASES[card.base].limit_weight is None:
+    if card.base not in BASES or card.base != LOOP.name:
         raise ModelError(model.name, expected=f"a base of {[LOOP.name]}", found=repr(card.base))
     learned = replace(
         rule,
