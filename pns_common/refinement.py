@@ -33,6 +33,7 @@ from pns_common.report import (
     longest,
 )
 from pns_common.schemes import Scheme
+from pns_common.sharpness import with_sharp_edges
 from pns_common.topology import Topology, split_faces
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
@@ -139,9 +140,10 @@ def refine(
         limit: put the last level's vertices where the base scheme would take them if it were
             applied for ever, and return the limit surface's normals there.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
-            1994). "auto": for a model of format 4 the edges that turn by more than 40 degrees and
-            are connected by such edges to one that turns by more than 60, at as many levels as its
-            card says; none for other schemes. None: no edge.
+            1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
+            as sharp as the sharpness network finds it; for a model of format 4 without one, the
+            edges that turn by more than 40 degrees and are connected by such edges to one that
+            turns by more than 60; none for other schemes. None: no edge.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -167,7 +169,7 @@ def refine(
 
     if not mesh.triangles:
         raise MeshError("faces of other degrees, expected triangles", element="faces")
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
+    topology = with_sharp_edges(mesh, kept, scheme, blocks)
     points, steps = mesh.vertices, list[Step]()
     for depth in range(count):
         if steps:
@@ -211,7 +213,7 @@ def control_level(
     """
     blocks = Blocks(_threads(threads))
     kept = chosen_creases(creases, scheme.creases)
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
+    topology = with_sharp_edges(mesh, kept, scheme, blocks)
     length = _reference_length(mesh, reference_length, measured=True)
     return Level(mesh.vertices, topology, scheme.base, length, blocks)
 

@@ -18,9 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer
 
+from pns_common.creases import AUTOMATIC, Creases
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
+from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.operator import NETWORK_ROWS, Rule, checked_answers, gate_of
+from pns_common.parallel import Blocks
+from pns_common.schemes import Scheme, loop
 from pns_common.topology import Topology
 
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
@@ -159,3 +163,59 @@ def _whole(
 
 def _mean(values: Float[np.ndarray, " N"]) -> float:
     return float(values.mean()) if len(values) else 0.0
+
+
+# --- for whole meshes -----------------------------------------------------------------------------
+
+
+def with_sharp_edges(mesh: Mesh, creases: Creases, scheme: Scheme, blocks: Blocks) -> Topology:
+    """Return a mesh's topology with the edges that are named, and those that are found.
+
+    Raises:
+        ParameterError: a named pair is no edge of the mesh.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    topology = creases.applied(mesh.vertices, mesh.topology(blocks))
+    if not (creases.learned and scheme.rule):
+        return topology
+    level = Level(mesh.vertices, topology, scheme.base, None, blocks)
+    return topology.with_sharpness(learned_sharpness(level, scheme.rule))
+
+
+def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
+    """Return the creases that are named or found, all by name.
+
+    Raises:
+        ParameterError: a named pair is no edge of the mesh.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    topology = with_sharp_edges(mesh, creases, scheme, Blocks())
+    found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
+    sharpness = topology.sharpness[found] if len(topology.soft) else None
+    return Creases(topology.edges[found].astype(np.int64), sharpness, levels=creases.levels)
+
+
+def sharp_edges(
+    mesh: Mesh, angle: float | None = None, scheme: Scheme | None = None
+) -> Integer[np.ndarray, "N 2"]:
+    """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
+
+    Args:
+        mesh: a mesh of triangles.
+        angle: edges that turn by more than so many degrees.
+        scheme: without an angle: edges to which ``creases="auto"`` of this scheme gives a sharpness
+            above ½. None: those that turn by more than 40 degrees and are connected by such edges
+            to one that turns by more than 60.
+
+    Raises:
+        ParameterError: it is no Mesh, or the angle is out of range.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    check_is_mesh(mesh)
+    creases = AUTOMATIC if scheme is None else scheme.creases
+    named = creases_by_name(
+        mesh, creases if angle is None else Creases(angle=angle), scheme or loop()
+    )
+    pairs = named.sharp_pairs
+    assert pairs is not None
+    return pairs
