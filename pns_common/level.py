@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.base_scheme import BaseScheme
+from pns_common.creases import Creases
 from pns_common.kernels import connectivity, measures
-from pns_common.normals import NO_AREAS
+from pns_common.normals import NO_AREAS, measure_faces
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
 
@@ -61,6 +62,19 @@ class Level:
     reference_length: float | None
     blocks: Blocks
 
+    def with_creases(self, creases: Creases) -> Level:
+        """Return the level with some edges kept sharp, and what is known of its faces."""
+        normals = None if creases.angle is None else self.normals
+        quiet = self.blocks.quiet()
+        return self.with_topology(creases.applied(self.points, self.topology, normals, quiet))
+
+    def with_topology(self, topology: Topology) -> Level:
+        """Return the level with other sharpness, and what is known of its faces."""
+        made = replace(self, topology=topology)
+        if "faces" in vars(self):
+            vars(made)["faces"] = self.faces
+        return made
+
     def measure(self, *, rings: bool, bends: bool) -> None:
         """Make the measurements that several threads are about to read."""
         _ = self.normals, self.logs
@@ -72,15 +86,7 @@ class Level:
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
         """Unit normals, and twice the area vectors with their lengths."""
-        triangles = self.topology.faces
-        normals, areas = np.empty((len(triangles), 3)), np.empty((len(triangles), 4))
-        self.blocks.run(
-            len(triangles),
-            lambda begin, end: measures.measure_faces(
-                self.points, triangles, begin, end, normals, areas
-            ),
-        )
-        return normals, areas
+        return measure_faces(self.points, self.topology, self.blocks, areas=True)
 
     @property
     def normals(self) -> Float[np.ndarray, "F 3"]:

@@ -22,7 +22,8 @@ from pns_common.creases import AUTOMATIC, Creases
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
 from pns_common.mesh import Mesh, check_is_mesh
-from pns_common.operator import NETWORK_ROWS, Rule, checked_answers, gate_of
+from pns_common.normals import measure_faces
+from pns_common.operator import NETWORK_ROWS, Rule, checked_answers
 from pns_common.parallel import Blocks
 from pns_common.schemes import Scheme, loop
 from pns_common.topology import Topology
@@ -94,7 +95,7 @@ def sharpness_inputs(
     """
     seen = turned_edges(level)
     rows = seen.topology.interior
-    return rows, seen.features(rows), gate_of(vertex_gate_sharpness * seen.jumps[rows])
+    return rows, seen.features(rows), np.tanh(vertex_gate_sharpness * seen.jumps[rows])
 
 
 def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
@@ -107,7 +108,7 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
     if network is None:
         return made
     seen = turned_edges(level)
-    gate = gate_of(rule.vertex_gate_sharpness * seen.jumps)
+    gate = np.tanh(rule.vertex_gate_sharpness * seen.jumps)
     rows = np.flatnonzero(gate).astype(np.uint32)
 
     def ask(begin: int, end: int) -> None:
@@ -122,8 +123,9 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
 def turned_edges(level: Level) -> TurnedEdges:
     """Measure a mesh, as if it had no marks."""
     mesh, blocks = level.topology.without_creases(), level.blocks.quiet()
-    unmarked = Level(level.points, mesh, level.base, None, blocks)
-    areas, measured = unmarked.faces[1][:, 3].copy(), unmarked.edges
+    areas, measured = level.faces[1], level.with_topology(mesh).edges
+    if len(areas) < mesh.face_count:  # not kept
+        _, areas = measure_faces(level.points, mesh, blocks, areas=True)
     turns = np.empty(len(mesh.edges))
     blocks.run(
         len(turns),
@@ -142,7 +144,7 @@ def turned_edges(level: Level) -> TurnedEdges:
         measured.lengths,
         measured.jumps,
         turns,
-        areas,
+        np.ascontiguousarray(areas[:, 3]),
         columns,
         starts,
         spokes,
@@ -168,18 +170,18 @@ def _mean(values: Float[np.ndarray, " N"]) -> float:
 # --- for whole meshes -----------------------------------------------------------------------------
 
 
-def with_sharp_edges(mesh: Mesh, creases: Creases, scheme: Scheme, blocks: Blocks) -> Topology:
-    """Return a mesh's topology with the edges that are named, and those that are found.
+def with_sharp_edges(level: Level, creases: Creases, scheme: Scheme) -> Level:
+    """Return a level with the edges that are named, and those that are found.
 
     Raises:
         ParameterError: a named pair is no edge of the mesh.
         ModelError: a network's answer is not finite, or has another shape.
     """
-    topology = creases.applied(mesh.vertices, mesh.topology(blocks))
+    level = level.with_creases(creases)
     if not (creases.learned and scheme.rule):
-        return topology
-    level = Level(mesh.vertices, topology, scheme.base, None, blocks)
-    return topology.with_sharpness(learned_sharpness(level, scheme.rule))
+        return level
+    made = level.topology.with_sharpness(learned_sharpness(level, scheme.rule))
+    return level.with_topology(made)
 
 
 def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
@@ -189,7 +191,8 @@ def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
         ParameterError: a named pair is no edge of the mesh.
         ModelError: a network's answer is not finite, or has another shape.
     """
-    topology = with_sharp_edges(mesh, creases, scheme, Blocks())
+    level = Level(mesh.vertices, mesh.topology(), scheme.base, None, Blocks())
+    topology = with_sharp_edges(level, creases, scheme).topology
     found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
     sharpness = topology.sharpness[found] if len(topology.soft) else None
     return Creases(topology.edges[found].astype(np.int64), sharpness, levels=creases.levels)
@@ -201,7 +204,7 @@ def sharp_edges(
     """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
 
     Args:
-        mesh: a mesh of triangles.
+        mesh: a mesh of any polygons.
         angle: edges that turn by more than so many degrees.
         scheme: without an angle: edges to which ``creases="auto"`` of this scheme gives a sharpness
             above ½. None: those that turn by more than 40 degrees and are connected by such edges

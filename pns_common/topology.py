@@ -69,7 +69,7 @@ class Topology:
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
-        plain: all faces are triangles, none names a vertex twice, no two have the same vertices.
+        plain: no face names a vertex twice, and no two triangles have the same vertices.
     """
 
     vertex_count: int
@@ -104,6 +104,10 @@ class Topology:
         """Edges (a, b), (b, c), (c, a) of each triangle; ValueError as for ``faces``."""
         self._need_triangles()
         return self.corner_edges.reshape(-1, TRIANGLE)
+
+    def face_of(self, corners: Integer[np.ndarray, "*N"]) -> Integer[np.ndarray, "*N"]:
+        """Return the faces of some corners."""
+        return corners // TRIANGLE if self.triangles else self.face_of_corner[corners]
 
     def _need_triangles(self) -> None:
         if not self.triangles:
@@ -286,10 +290,9 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
     repeats, repeating = np.zeros(0, dtype=bool), False
-    # A triangle that names a vertex twice has an edge from a vertex to itself.
-    if not triangles or bool((edges[:, 0] == edges[:, 1]).any()):
+    if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
         repeating = kernels.mark_repeats(corners, offsets, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
@@ -307,7 +310,7 @@ def build_topology(
         half_edges,
         edge_class,
         NO_WEIGHTS,
-        plain and triangles and not repeating,
+        (plain or not triangles) and not repeating,
     )
 
 
@@ -323,18 +326,10 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         inherit: whether the halves of creases and soft edges inherit their sharpness.
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
-    creases, soft = parent.crease_edges, parent.soft
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
-        if not inherit:
-            return made
-        made = made.with_creases(made.rows_of(halves_of(parent, creases)))
-        if len(soft):
-            rows = np.flatnonzero(soft)
-            sharpness = np.zeros(len(made.edges))
-            sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(soft[rows], 2)
-            made = made.with_sharpness(sharpness)
-        return made
+        return inheriting(made, parent) if inherit else made
+    soft = parent.soft
     source = parent if inherit else parent.without_creases()
     face_count, edge_count = parent.face_count, len(parent.edges)
     halves = np.empty((edge_count, 2), dtype=np.uint32)
@@ -369,6 +364,17 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     )
 
 
+def inheriting(made: Topology, parent: Topology) -> Topology:
+    """Return the topology of a split in which the halves of edges have their sharpness."""
+    made = made.with_creases(made.rows_of(halves_of(parent, parent.crease_edges)))
+    if len(parent.soft):
+        rows = np.flatnonzero(parent.soft)
+        sharpness = np.zeros(len(made.edges))
+        sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(parent.soft[rows], 2)
+        made = made.with_sharpness(sharpness)
+    return made
+
+
 def split_faces(
     parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
 ) -> Integer[np.ndarray, "C 3"]:
@@ -391,7 +397,10 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
+    corners: UInt32[np.ndarray, " H"],
+    offsets: Integer[np.ndarray, " F1"],
+    vertex_count: int,
+    blocks: Blocks,
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -403,9 +412,10 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges = np.empty((made, 2), dtype=np.uint32)
-    edges[:, 0], edges[:, 1] = low[:made], links[:made, kernels.HIGH]
-    half_edges = links[:made, kernels.FIRST :].copy()
+    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
+    blocks.quiet().run(
+        made, lambda begin, end: kernels.read_links(low, links, begin, end, edges, half_edges)
+    )
     return edges, half_edges, corner_edges, bool(plain[0])
 
 
@@ -432,6 +442,7 @@ def _sort_edges(
     corner_edges = number[group]
     sides = np.sort(corner_edges[: 3 * (len(corners) // 3)].reshape(-1, 3), axis=1)
     plain = len(np.unique(_keys(sides[:, :2], len(order)))) == len(sides)
+    plain = plain and bool((pairs[:, 0] != pairs[:, 1]).all())
     return np.sort(pairs[first[order]], axis=1), half_edges, corner_edges, plain
 
 

@@ -86,6 +86,14 @@ def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, p
     return count
 
 
+@kernel
+def read_links(low, links, begin, end, edges, half_edges):
+    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
+    for e in range(max(begin, 0), end):
+        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
+        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
+
+
 @inlined
 def _may_have_twin(corner_edges, links, f):
     """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
@@ -141,7 +149,7 @@ def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edg
 def _in_repeating_face(face_of_corner, repeats, h):
     if len(repeats) == 0:
         return False
-    return repeats[face_of_corner[h] if len(face_of_corner) else h // 3]
+    return repeats[face_of(h, face_of_corner)]
 
 
 @kernel
@@ -165,6 +173,12 @@ def next_corner(h):
 def previous_corner(h):
     """Return the previous corner of a triangle."""
     return h - 1 + 3 * (h % 3 == 0)
+
+
+@inlined
+def face_of(h, face_of_corner):
+    """Return the face of a corner."""
+    return face_of_corner[h] if len(face_of_corner) else h // 3
 
 
 @inlined
@@ -288,12 +302,12 @@ def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
 
 
 @inlined
-def _opened_before(half_edges, face):
-    """Count the edges that first appear in an earlier face; first half-edges ascend."""
+def opened_before(half_edges, corner):
+    """Count the edges that first appear before a corner; first half-edges ascend."""
     least, most = 0, half_edges.shape[0]
     while least < most:
         middle = (least + most) // 2
-        if half_edges[middle, 0] < 3 * face:
+        if half_edges[middle, 0] < corner:
             least = middle + 1
         else:
             most = middle
@@ -306,7 +320,7 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
 
     ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
     """
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
     for f in range(max(begin, 0), end):
         for i in range(3):
             before = i - 1 if i > 0 else 2
@@ -358,7 +372,7 @@ def split_edges(
 ):
     """Write the edges of the children of triangles begin … end − 1."""
     to = to_edges, to_half_edges, to_class
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
     for f in range(max(begin, 0), end):
         for i in range(3):
             before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0

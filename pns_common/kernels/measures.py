@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import inlined, kernel
-from pns_common.kernels.connectivity import INTERIOR, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, face_of, skipped_block
 from pns_common.kernels.vectors import (
+    NO_AREA,
     between,
     cross,
     difference,
@@ -52,6 +53,31 @@ def measure_faces(points, faces, begin, end, normals, areas):
 
 
 @kernel
+def measure_polygons(points, corners, offsets, begin, end, normals, areas):
+    """Write what ``measure_faces`` does, of polygons: their area vectors are sums over fans."""
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        origin = row(points, corners[first])
+        vector, squares = (0.0, 0.0, 0.0), 0.0
+        before = difference(row(points, corners[first + 1]), origin)
+        squares += dot(before, before)
+        for h in range(first + 2, stop):
+            spoke = difference(row(points, corners[h]), origin)
+            part = cross(before, spoke)
+            vector = vector[0] + part[0], vector[1] + part[1], vector[2] + part[2]
+            squares += dot(spoke, spoke)
+            before = spoke
+        length, shortest = norm(vector), NO_AREA * squares
+        known = dot(vector, vector) > shortest * shortest
+        for k in range(3):
+            normals[f, k] = vector[k] / length if known else 0.0
+        if len(areas):
+            for k in range(3):
+                areas[f, k] = vector[k]
+            areas[f, AREA] = length
+
+
+@kernel
 def measure_edges(
     points, normals, corners, edges, half_edges, edge_class, begin, end, lengths, jumps, bends
 ):
@@ -76,6 +102,18 @@ def measure_edges(
         if square > 0:
             direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
             bends[e] = dot(cross(n, m), direction)
+
+
+@kernel
+def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, cosines):
+    """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
+    for e in range(max(begin, 0), end):
+        cosines[e] = 1.0
+        if edge_class[e] == INTERIOR:
+            n = row(normals, face_of(half_edges[e, 0], face_of_corner))
+            m = row(normals, face_of(half_edges[e, 1], face_of_corner))
+            if dot(n, n) > 0 and dot(m, m) > 0:
+                cosines[e] = dot(n, m)
 
 
 @kernel
