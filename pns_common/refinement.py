@@ -36,6 +36,7 @@ from pns_common.report import (
 )
 from pns_common.schemes import NAMES, Scheme, named_scheme
 from pns_common.selection import Selected, chosen_faces, select
+from pns_common.sharpness import with_sharp_edges
 from pns_common.topology import TRIANGLE, Topology
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
@@ -170,9 +171,10 @@ def refine(
         limit: put the last level's vertices where the base scheme would take them if it were
             applied for ever, and return the limit surface's normals there.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
-            1994). "auto": for a model of format 4 the edges that turn by more than 40 degrees and
-            are connected by such edges to one that turns by more than 60, at as many levels as its
-            card says; none for other schemes. None: no edge.
+            1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
+            as sharp as the sharpness network finds it; for a model of format 4 without one, the
+            edges that turn by more than 40 degrees and are connected by such edges to one that
+            turns by more than 60; none for other schemes. None: no edge.
         border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
         faces: refine these alone, by number or as a mask. Neighbours are cut to meet them, and
             other vertices stay. The report is that of refining all.
@@ -203,7 +205,7 @@ def refine(
         raise ParameterError("faces", scheme.name, expected="a scheme of triangles")
 
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
-    level, steps = level.with_creases(kept), list[Step]()
+    level, steps = with_sharp_edges(level, kept, scheme), list[Step]()
     for depth in range(count):
         if steps:
             topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
@@ -285,7 +287,7 @@ def control_level(
     kept = chosen_creases(creases, scheme.creases)
     length = _reference_length(mesh, reference_length, measured=True)
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
-    return level.with_creases(kept)
+    return with_sharp_edges(level, kept, scheme)
 
 
 def refine_many(
