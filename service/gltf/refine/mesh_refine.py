@@ -10,12 +10,14 @@ from jaxtyping import Bool, Float, Int
 from pns_common.columns import level_topologies
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine, refine_many
 from pns_common.report import Report
 from pns_common.rows import disjoint_faces, extent
 from pns_common.schemes import Scheme
+from pns_common.sharpness import creases_by_name
 from pns_common.topology import split_faces
 
 from ...course import Course
@@ -43,6 +45,7 @@ class RefinedMesh:
         cut: (P,) vertices of each part that lost a joint for lack of slots.
         scalars: further attributes by name.
         limit_normals: normals to use in place of those of the faces; None: none.
+        parents: the vertices of the control mesh that each is made of; None: not asked for.
     """
 
     mesh: Mesh
@@ -51,26 +54,49 @@ class RefinedMesh:
     cut: Int[np.ndarray, " P"]
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
+    parents: SubdivisionMatrix | None = None
 
 
-def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
+def creases_of(
+    control: ControlMesh, options: Options, scheme: Scheme, parts: Parts | None = None
+) -> Creases:
     """Return the edges of the mesh to refine that the options keep sharp, by name.
 
-    With `crease=auto` these are the scheme's, and the edges that smooth shading marks as hard.
+    With `crease=auto` these are the scheme's, and the edges that smooth shading marks as hard. Each
+    of the `parts` of a union has those that it has alone.
     """
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
-        return Creases(hard_edges(control))
-    by_shape = creases_by_shape(control.mesh, options, scheme)
-    if options.crease != "auto" or scheme.creases.angle is None:
+        return Creases(hard_edges(control), border=options.border)
+    if parts is None or options.crease != "auto" or not scheme.creases.learned:
+        by_shape = creases_by_shape(control.mesh, options, scheme)
+    else:
+        by_shape = _creases_of_parts(control, parts, scheme)
+    by_shape = replace(by_shape, border=options.border)
+    if options.crease != "auto" or not scheme.creases.finds:
         return by_shape
     return by_shape.with_named(marked_edges(control))
 
 
+def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Creases:
+    """Return the edges that are found in each part of a union, by name."""
+    named, sharpness, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0)], 0
+    for mesh, _ in _jobs(
+        control.mesh, parts.count_faces(control.cleaned.face_map >= 0), NO_CREASES
+    ):
+        found = creases_by_name(mesh, scheme.creases, scheme)
+        if found.named is not None:
+            named.append(first + found.named)
+            own = found.sharpness
+            sharpness.append(np.ones(len(found.named)) if own is None else own)
+        first += len(mesh.vertices)
+    return Creases(np.concatenate(named), np.concatenate(sharpness), levels=scheme.creases.levels)
+
+
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
     """Return the named edges that are sharp at the last level."""
-    return creases.named if creases.sharp_at(levels - 1) else None
+    return creases.sharp_pairs if creases.sharp_at(levels - 1) else None
 
 
 def refined_mesh(
@@ -80,8 +106,10 @@ def refined_mesh(
     options: Options,
     pointer: str,
     course: Course,
+    *,
+    traced: bool = False,
 ) -> RefinedMesh:
-    """Refine a control mesh that has faces.
+    """Refine a control mesh that has faces; `traced` asks for the parents of vertices.
 
     Raises:
         UnrefinableError: refined positions leave the range of float32.
@@ -107,6 +135,7 @@ def refined_mesh(
         *refined_skin_and_morph(control, faces, levels, options, course),
         _scalars(made, options),
         made.normals if options.normals == "limit" else None,
+        made.parents if traced else None,
     )
 
 
@@ -172,16 +201,21 @@ def _jobs(
     union: Mesh, counts: Int[np.ndarray, " P"], creases: Creases
 ) -> list[tuple[Mesh, Creases]]:
     """Return the parts of a union, whose faces and vertices follow each other, with creases."""
-    named = np.zeros((0, 2), dtype=np.int64) if creases.named is None else creases.named
+    named, sharpness = creases.named, creases.sharpness
+    if named is None:
+        named = np.zeros((0, 2), dtype=np.int64)
     ends = np.cumsum(counts)
     vertex_ends = 1 + np.maximum.reduceat(union.faces.max(axis=1), np.append(0, ends[:-1]))
-    named = named[np.argsort(named[:, 0], kind="stable")]
+    order = np.argsort(named[:, 0], kind="stable")
+    named, sharpness = named[order], None if sharpness is None else sharpness[order]
     crease_ends = np.searchsorted(named[:, 0], vertex_ends)
     jobs: list[tuple[Mesh, Creases]] = []
     face, vertex, crease = 0, 0, 0
     for face_end, vertex_end, crease_end in zip(ends, vertex_ends, crease_ends, strict=True):
         mesh = Mesh(union.vertices[vertex:vertex_end], union.faces[face:face_end] - vertex)
-        jobs.append((mesh, replace(creases, named=named[crease:crease_end] - vertex)))
+        own = slice(crease, crease_end)
+        weights = None if sharpness is None else sharpness[own]
+        jobs.append((mesh, replace(creases, named=named[own] - vertex, sharpness=weights)))
         face, vertex, crease = face_end, vertex_end, crease_end
     return jobs
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common import Creases, Mesh, Refinement, Scheme, loop, refine
 from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.reference_length import measure_reference_length
 
@@ -43,7 +43,7 @@ def refine_positions(
     """
     if steps.wears_off:
         return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
-    creases, levels = _or_none(steps.steps[0].creases), len(steps.steps)
+    creases, levels = Creases(steps.steps[0].creases), len(steps.steps)
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
     added = next((step.added for step in reversed(made.steps) if step.added), None)
     acted = made if added is None else added
@@ -65,10 +65,10 @@ def _level_by_level(
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
         rule = scheme if scheme.acts_at(depth) else loop()
-        smooth = made = counter.reading(mesh, rule, length, step.creases)
+        smooth = made = counter.reading(mesh, rule, length, step.soft.with_named(step.creases))
         points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
-            made = counter.reading(mesh, rule, length, step.mixture.creases)
+            made = counter.reading(mesh, rule, length, step.soft.with_named(step.mixture.creases))
             points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
             readings.append(_distances(made.report))
         acted = made if acted is None or scheme.acts_at(depth) else acted
@@ -120,15 +120,11 @@ class _Counter:
         mesh: Mesh,
         scheme: Scheme,
         length: float,
-        creases: Int[np.ndarray, "N 2"],
+        creases: Creases,
     ) -> Refinement:
-        made = refine(mesh, scheme, 1, length, creases=_or_none(creases), progress=self._tell)
+        made = refine(mesh, scheme, 1, length, creases=creases, progress=self._tell)
         self._done += len(made.mesh.faces)
         return made
 
     def _tell(self, done: int, total: int) -> None:
         self._progress(self._done + done, self._total)
-
-
-def _or_none(creases: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"] | None:
-    return creases if len(creases) else None
