@@ -7,6 +7,7 @@ its kind.
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import fast_simplification
 import numpy as np
@@ -36,6 +37,9 @@ EVEN = 1.15
 
 # Of isotropic remeshing, each time with a length corrected by the last result's faces.
 TRIES, ITERATIONS = 2, 5
+
+# Compiled, and without types.
+meshlab: Any = pymeshlab
 
 Simplifier = Callable[[Mesh, int], Mesh]
 
@@ -120,21 +124,21 @@ def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
     return part if near and kept else None
 
 
-def _decimated(meshes: pymeshlab.MeshSet, faces: float, **options: bool) -> None:
+def _decimated(meshes: Any, faces: float, **options: bool) -> None:
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=int(faces), preservenormal=True, preserveboundary=True, **options
     )
 
 
-def _remeshed(meshes: pymeshlab.MeshSet, length: float) -> None:
+def _remeshed(meshes: Any, length: float) -> None:
     meshes.meshing_isotropic_explicit_remeshing(
-        targetlen=pymeshlab.PureValue(length), iterations=ITERATIONS
+        targetlen=meshlab.PureValue(length), iterations=ITERATIONS, checksurfdist=False
     )
 
 
 def _by_meshlab(mesh: Mesh, run: Callable[..., None], size: float, **options: bool) -> Mesh:
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces.astype(np.int32)))
+    meshes = meshlab.MeshSet(verbose=False)
+    meshes.add_mesh(meshlab.Mesh(mesh.vertices, mesh.faces.astype(np.int32)))
     run(meshes, size, **options)
     done = meshes.current_mesh()
     return _mesh(done.vertex_matrix(), done.face_matrix())
