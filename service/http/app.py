@@ -22,7 +22,7 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, layers, openapi, page, problems, result_room, routes
+from . import layers, openapi, pages, problems, result_room, routes
 from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
@@ -147,9 +147,8 @@ def create_app(
         )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
-    app.include_router(docs_page.router())
     app.openapi = openapi.Description(app)  # type: ignore[method-assign]
-    app.include_router(page.router(settings.prefix))
+    app.include_router(pages.router(settings.prefix))
     return app
 
 

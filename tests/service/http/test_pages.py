@@ -1,4 +1,4 @@
-"""The page's files: what is sent with them, and that nothing else of the disk is."""
+"""The page and `/docs`: what is sent with their files, and that nothing else of the disk is."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from service.http import page
 from service.http.app import create_app
-from service.http.static_files import MEDIA_TYPES
+from service.http.pages import DOCS, DOCS_FILES, MEDIA_TYPES, PAGE, PAGE_POLICY
 from service.settings import Settings
 from tests.support.live import local
 
 CLIENT = local(create_app(Settings(workers=1)))
-ASSETS = sorted((page.FOLDER / "assets").iterdir())
+ASSETS = sorted((PAGE / "assets").iterdir())
 ADDRESS = re.compile(r'(?:src|href)="([^"#]+)"')
 
 
@@ -53,11 +52,11 @@ def test_every_file_comes_with_the_policy_and_its_type(path: str) -> None:
 
 
 def test_the_policy_lets_in_no_inline_script_and_no_foreign_address() -> None:
-    directives = dict(part.split(" ", 1) for part in page.POLICY.split("; "))
+    directives = dict(part.split(" ", 1) for part in PAGE_POLICY.split("; "))
     assert directives["default-src"] == directives["frame-ancestors"] == "'none'"
     assert directives["script-src"] == "'self' 'wasm-unsafe-eval'"
     assert directives["connect-src"] == "'self' blob:"
-    assert not re.search(r"https?:|\*|unsafe-inline|'unsafe-eval'", page.POLICY)
+    assert not re.search(r"https?:|\*|unsafe-inline|'unsafe-eval'", PAGE_POLICY)
 
 
 def test_the_page_is_asked_for_again_and_its_assets_never() -> None:
@@ -67,7 +66,7 @@ def test_the_page_is_asked_for_again_and_its_assets_never() -> None:
     assert re.search(r"-[0-9A-Za-z]{8}\.\w+$", ASSETS[0].name)
 
 
-@pytest.mark.parametrize("path", ["/", f"/assets/{ASSETS[0].name}"])
+@pytest.mark.parametrize("path", ["/", f"/assets/{ASSETS[0].name}", "/docs/swagger-ui.css"])
 def test_a_client_that_has_the_file_gets_no_bytes(path: str) -> None:
     tag = CLIENT.get(path).headers["ETag"]
     # A strong one would be the same bytes: it is one for what is compressed and what is not.
@@ -91,7 +90,7 @@ def test_a_client_that_takes_gzip_gets_it(accepted: str, packed: bool) -> None:
         assert (answer.headers.get("Content-Encoding") == "gzip") is packed
         sent = b"".join(answer.iter_raw())
     content = gzip.decompress(sent) if packed else sent
-    assert content == (page.FOLDER / "index.html").read_bytes()
+    assert content == (PAGE / "index.html").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -119,7 +118,39 @@ def test_the_first_visit_loads_less_than_350_kb() -> None:
             needed.add(name)
             waiting += re.findall(r'(?:from|import)"\./([^"]+\.js)"', text[name])
     needed |= {path.name for path in ASSETS if path.suffix in (".css", ".svg")}
-    sizes = [len(gzip.compress((page.FOLDER / "assets" / name).read_bytes())) for name in needed]
-    index = len(gzip.compress((page.FOLDER / "index.html").read_bytes()))
+    sizes = [len(gzip.compress((PAGE / "assets" / name).read_bytes())) for name in needed]
+    index = len(gzip.compress((PAGE / "index.html").read_bytes()))
     assert len(needed) > 3
     assert sum(sizes) + index < 350_000
+
+
+def test_the_description_and_all_that_it_names_are_there() -> None:
+    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', CLIENT.get("/docs").text)
+    assert len(named) == 4
+    for path in named:
+        assert CLIENT.get(f"/{path}").status_code == 200, path
+
+
+@pytest.mark.parametrize("name", DOCS_FILES)
+def test_in_the_description_nothing_of_another_host_may_run(name: str) -> None:
+    answer = CLIENT.get("/docs" if name == "index.html" else f"/docs/{name}")
+    policy = answer.headers["content-security-policy"]
+    assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self';")
+    assert not re.search("unsafe|http", policy)
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert answer.headers["content-type"] == MEDIA_TYPES[Path(name).suffix]
+
+
+def test_what_is_written_for_the_description_names_no_host() -> None:
+    for name in ("index.html", "start.js"):
+        assert "//" not in re.sub(r"(?m)^ *//.*$", "", (DOCS / name).read_text())
+
+
+@pytest.mark.parametrize("name", ["LICENSE", "none", "..%2fpages.py", "%2e%2e/pages.py"])
+def test_beside_the_description_nothing_is_served(name: str) -> None:
+    assert CLIENT.get(f"/docs/{name}").status_code == 404
+
+
+def test_the_licences_are_with_it() -> None:
+    names = {path.name for path in DOCS.iterdir()}
+    assert {"LICENSE", "NOTICE", "swagger-ui-bundle.js.LICENSE.txt"} <= names
