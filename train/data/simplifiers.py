@@ -35,11 +35,12 @@ CLUSTERED = 8
 # Target length over that of as many equilateral triangles, at first.
 EVEN = 1.15
 
-# Of isotropic remeshing, each time with a length corrected by the last result's faces.
-TRIES, ITERATIONS = 2, 5
+# Of isotropic remeshing, done twice: the second length is corrected by the first result's faces.
+ITERATIONS = 5
 
-# Compiled, and without types.
+# Libraries without types.
 meshlab: Any = pymeshlab
+vtk: Any = pyvista
 
 Simplifier = Callable[[Mesh, int], Mesh]
 
@@ -64,7 +65,7 @@ def meshlab_vertices(mesh: Mesh, faces: int) -> Mesh:
 
 def vtk_quadric(mesh: Mesh, faces: int) -> Mesh:
     """Collapse edges by quadrics with VTK's own placement (vtkQuadricDecimation)."""
-    done = pyvista.make_tri_mesh(mesh.vertices, mesh.faces).decimate(1 - faces / len(mesh.faces))
+    done = vtk.make_tri_mesh(mesh.vertices, mesh.faces).decimate(1 - faces / len(mesh.faces))
     return _mesh(done.points, done.regular_faces)
 
 
@@ -76,11 +77,11 @@ def centroidal(mesh: Mesh, faces: int) -> Mesh:
     with warnings.catch_warnings():
         # pyacvd reads PyVista's arrays by their old names.
         warnings.simplefilter("ignore", PyVistaDeprecationWarning)
-        clusters = pyacvd.Clustering(pyvista.make_tri_mesh(mesh.vertices, mesh.faces))
+        clusters = pyacvd.Clustering(vtk.make_tri_mesh(mesh.vertices, mesh.faces))
         if splits:
             clusters.subdivide(splits)
         clusters.cluster(count)
-        done = clusters.create_mesh()
+        done: Any = clusters.create_mesh()
     return _mesh(done.points, done.regular_faces)
 
 
@@ -91,10 +92,8 @@ def isotropic(mesh: Mesh, faces: int) -> Mesh:
     area = float(np.linalg.norm(twice, axis=1).sum()) / 2
     length = EVEN * np.sqrt(4 / np.sqrt(3) * area / faces)
 
-    for _ in range(TRIES):
-        remeshed = _by_meshlab(mesh, _remeshed, length)
-        length *= np.sqrt(len(remeshed.faces) / faces)
-    return remeshed
+    first = _by_meshlab(mesh, _remeshed, length)
+    return _by_meshlab(mesh, _remeshed, length * np.sqrt(len(first.faces) / faces))
 
 
 SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
