@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path
@@ -56,7 +57,7 @@ NOTE = (
 
 @dataclass(frozen=True)
 class ZeroNetworks:
-    """A model whose corrections are all zero; the rest is the model's own."""
+    """A model whose corrections are all zero; its card and its sharp edges are its own."""
 
     model: Model
 
@@ -86,6 +87,10 @@ class ZeroNetworks:
         """Return no correction of vertices."""
         return np.zeros((len(features), 3), dtype=np.float32)
 
+    def sharpness(self, features: np.ndarray) -> np.ndarray:
+        """Return the model's own sharpness of edges."""
+        return self.model.sharpness(features)
+
 
 @dataclass(frozen=True, slots=True)
 class Contender:
@@ -97,16 +102,17 @@ class Contender:
 
 def contenders(model: Model) -> dict[str, Contender]:
     """Return all methods by the names of the table, Loop first."""
+    ours, zero = pns(model), pns(ZeroNetworks(model))
     return {
         LOOP: Contender(loop()),
         FLAT: Contender(flat()),
         "PN triangles, 40°": Contender(
-            pn_triangles(SPLIT), lambda mesh: found_sharp_edges(mesh, SPLIT)
+            pn_triangles(SPLIT), partial(found_sharp_edges, angle=SPLIT)
         ),
         "Butterfly": Contender(modified_butterfly()),
         "N1": Contender(n1()),
-        ZERO: Contender(pns(ZeroNetworks(model)), found_sharp_edges),
-        OURS: Contender(pns(model), found_sharp_edges),
+        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
+        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
     }
 
 
