@@ -10,12 +10,15 @@ COPY pyproject.toml setup.py README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
 # Our own package alone has no hash: it is built here, from these files, by what is pinned above.
+# What is never loaded goes: libraries' tests, and onnxruntime's tools and its library for other languages.
 RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/build/bin/python -m pip wheel --no-build-isolation --no-deps --no-index --wheel-dir /src/dist . \
  && /opt/pns/bin/python -m pip install --no-deps --no-index dist/*.whl \
  && /opt/pns/bin/python -m pip check \
  && /opt/build/bin/cyclonedx-py environment /opt/pns/bin/python --output-reproducible --of JSON -o /opt/pns/sbom.cdx.json \
- && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip
+ && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip \
+ && find /opt/pns/lib -type d \( -name test -o -name tests -o -name transformers \) -prune -exec rm -r {} + \
+ && rm /opt/pns/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.*
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of
