@@ -207,7 +207,7 @@ def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
         ("vertices dropped that no face uses", 1),
         ("not used by the document: quad.mtl", 1),
     }
-    assert report["totals"]["faces"] == 32
+    assert report["totals"]["faces"] == 16
 
 
 @pytest.mark.parametrize(
