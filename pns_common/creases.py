@@ -15,9 +15,6 @@ from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
 from pns_common.topology import MOSTLY_SHARP, Topology
 
-# ``crease=auto``: edges that turn by more than ANGLE degrees and are connected, by such edges, to
-# one that turns by more than SEED.
-ANGLE, SEED = 40.0, 60.0
 HALF_TURN = 180
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
 # OpenSubdiv the first are its VTX_BOUNDARY_EDGE_ONLY and VTX_BOUNDARY_EDGE_AND_CORNER.
@@ -32,8 +29,6 @@ class Creases:
         named: (N, 2) pairs of vertices; None for none.
         sharpness: (N,) sharpness of these, 0 … 1; None: 1.
         angle: find edges that turn by more than this, in degrees; None: find none.
-        seed: of these, keep those that are connected by such edges to one that turns by more than
-            this, in degrees; None: keep all.
         learned: ask the sharpness network of the scheme's model.
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
@@ -43,14 +38,12 @@ class Creases:
 
     Raises:
         ParameterError: pairs that are no pairs of whole numbers, sharpness that is not one number
-            from 0 to 1 a pair, an angle outside 0 … 180, a seed below the angle, levels below 1, or
-            another border.
+            from 0 to 1 a pair, an angle outside 0 … 180, levels below 1, or another border.
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
     sharpness: Float[np.ndarray, " N"] | None = None
     angle: float | None = None
-    seed: float | None = None
     learned: bool = False
     levels: int | None = None
     border: str = "smooth"
@@ -60,11 +53,9 @@ class Creases:
             object.__setattr__(self, "named", as_pairs(self.named))
         if self.sharpness is not None:
             _check_sharpness(self.sharpness, 0 if self.named is None else len(self.named))
-        angle, seed, levels = self.angle, self.seed, self.levels
+        angle, levels = self.angle, self.levels
         if angle is not None and not (is_number(angle) and 0 < angle < HALF_TURN):
             raise ParameterError("angle", angle, expected="degrees between 0 and 180")
-        if seed is not None and not (is_number(seed) and (angle or 0) <= seed < HALF_TURN):
-            raise ParameterError("seed", seed, expected="degrees, from the angle to below 180")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
         if self.border not in BORDERS:
@@ -145,14 +136,9 @@ class Creases:
         if self.angle is None:
             return np.zeros(0, dtype=np.int64)
         cosine = edge_cosines(points, topology, normals, blocks)
-        rows = np.flatnonzero(cosine < np.cos(np.radians(self.angle)))
-        if self.seed is None or len(rows) == 0:
-            return rows
-        seeds = cosine[rows] < np.cos(np.radians(self.seed))
-        return rows[_connected(topology.edges[rows].astype(np.int64), seeds)]
+        return np.flatnonzero(cosine < np.cos(np.radians(self.angle)))
 
 
-AUTOMATIC = Creases(angle=ANGLE, seed=SEED)
 NO_CREASES = Creases()
 
 
@@ -187,27 +173,6 @@ def edge_cosines(
         lambda begin, end: measures.turn_cosines(normals, *read, begin, end, cosine),
     )
     return cosine
-
-
-def _connected(
-    edges: Integer[np.ndarray, "N 2"], seeds: Bool[np.ndarray, " N"]
-) -> Bool[np.ndarray, " N"]:
-    """Return the edges that a path of edges connects to a seed."""
-    vertices, ends = np.unique(edges, return_inverse=True)
-    ends = ends.reshape(edges.shape)
-    label = np.arange(len(vertices))
-    while True:
-        least = np.minimum(label[ends[:, 0]], label[ends[:, 1]])
-        lower = label.copy()
-        np.minimum.at(lower, ends[:, 0], least)
-        np.minimum.at(lower, ends[:, 1], least)
-        lower = lower[lower]
-        if (lower == label).all():
-            break
-        label = lower
-    seeded = np.zeros(len(vertices), dtype=bool)
-    seeded[label[ends[seeds, 0]]] = True
-    return seeded[label[ends[:, 0]]]
 
 
 def as_pairs(creases: Any) -> Integer[np.ndarray, "N 2"]:

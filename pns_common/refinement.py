@@ -172,9 +172,7 @@ def refine(
             applied for ever, and return the limit surface's normals there.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
             1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
-            as sharp as the sharpness network finds it; for a model of format 4 without one, the
-            edges that turn by more than 40 degrees and are connected by such edges to one that
-            turns by more than 60; none for other schemes. None: no edge.
+            as sharp as the sharpness network finds it; none without one. None: no edge.
         border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
         faces: refine these alone, by number or as a mask. Neighbours are cut to meet them, and
             other vertices stay. The report is that of refining all.

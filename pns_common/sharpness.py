@@ -18,14 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.creases import AUTOMATIC, Creases
+from pns_common.creases import Creases
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
 from pns_common.mesh import Mesh, check_is_mesh
+from pns_common.model.file import load_model
 from pns_common.normals import measure_faces
 from pns_common.operator import NETWORK_ROWS, Rule, checked_answers
 from pns_common.parallel import Blocks
-from pns_common.schemes import Scheme, loop
+from pns_common.schemes import Scheme, loop, pns
 from pns_common.topology import Topology
 
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
@@ -207,18 +208,17 @@ def sharp_edges(
         mesh: a mesh of any polygons.
         angle: edges that turn by more than so many degrees.
         scheme: without an angle: edges to which ``creases="auto"`` of this scheme gives a sharpness
-            above ½. None: those that turn by more than 40 degrees and are connected by such edges
-            to one that turns by more than 60.
+            above ½. None: PNS with the default model.
 
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
         ModelError: a network's answer is not finite, or has another shape.
     """
     check_is_mesh(mesh)
-    creases = AUTOMATIC if scheme is None else scheme.creases
-    named = creases_by_name(
-        mesh, creases if angle is None else Creases(angle=angle), scheme or loop()
-    )
+    if scheme is None:
+        scheme = loop() if angle is not None else pns(load_model())
+    creases = scheme.creases if angle is None else Creases(angle=angle)
+    named = creases_by_name(mesh, creases, scheme)
     pairs = named.sharp_pairs
     assert pairs is not None
     return pairs

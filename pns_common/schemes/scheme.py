@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.base_scheme import BaseScheme
-from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases, chosen_creases
+from pns_common.creases import NO_CREASES, Creases, chosen_creases
 from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
 from pns_common.matrix import subdivision_matrix
@@ -157,12 +157,11 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         network_scale=_given(model, "network_scale"),
         fold_angle=_given(model, "fold_angle"),
     )
-    creases, is_learned = NO_CREASES, card.sharpness_features is not None
-    if is_learned:
+    creases = NO_CREASES
+    if card.sharpness_features is not None:
         learned = replace(learned, sharpness_network=partial(_sharpness, model))
-    if budget > 0 and card.sharpness_levels:
-        creases = Creases(learned=True) if is_learned else Creases(angle=ANGLE, seed=SEED)
-        creases = replace(creases, levels=card.sharpness_levels)
+        if budget > 0 and card.sharpness_levels:
+            creases = Creases(learned=True, levels=card.sharpness_levels)
     return Scheme(
         "pns",
         BASES[card.base],

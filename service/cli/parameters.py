@@ -83,8 +83,8 @@ CreaseOption = Annotated[
     str,
     typer.Option(
         metavar="auto|off|normals|angle:DEG",
-        help="edges to keep sharp; auto: with general those beyond 40 degrees that are connected "
-        "to one beyond 60, at two levels; normals: those that a glTF's normals make hard",
+        help="edges to keep sharp; auto: each as sharp as the model finds it, "
+        "at two levels; normals: those that a glTF's normals make hard",
     ),
 ]
 WeldOption = Annotated[

@@ -10,7 +10,7 @@ from service.meshes.shape_creases import creases_by_shape
 from service.options import Options
 from train.data.primitives import box, cylinder
 
-ASKING = replace(loop(), creases=Creases(angle=40.0, seed=60.0, levels=2))
+ASKING = replace(loop(), creases=Creases(angle=40.0, levels=2))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
 
-ASKING = replace(loop(), creases=Creases(angle=40.0, seed=60.0, levels=2))
+ASKING = replace(loop(), creases=Creases(angle=40.0, levels=2))
 
 
 def refined(shape, texture=None, scheme=None, **options):
