@@ -141,7 +141,7 @@ def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edg
 def _in_repeating_face(face_of_corner, repeats, h):
     if len(repeats) == 0:
         return False
-    return repeats[face_of_corner[h] if len(face_of_corner) else h // 3]
+    return repeats[face_of(h, face_of_corner)]
 
 
 @kernel
@@ -175,6 +175,12 @@ def face_corners(h, offsets, face_of_corner):
         return first, first + 3
     f = face_of_corner[h]
     return offsets[f], offsets[f + 1]
+
+
+@inlined
+def face_of(h, face_of_corner):
+    """Return the face of a corner."""
+    return face_of_corner[h] if len(face_of_corner) else h // 3
 
 
 @inlined

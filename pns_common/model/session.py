@@ -16,7 +16,13 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError, ParameterError
-from pns_common.model.card import CARD_KEY, EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+from pns_common.model.card import (
+    CARD_KEY,
+    EDGE_FEATURES,
+    FACE_FEATURES,
+    VERTEX_FEATURES,
+    ModelCard,
+)
 
 # Rows of one call of onnxruntime. 1,024 take a fifth longer a row, 8,192 and 16,384 as long.
 CHUNK_ROWS = 4096
@@ -53,6 +59,14 @@ class Model(Protocol):
         ...
 
 
+class PolygonModel(Model, Protocol):
+    """A model over Catmull–Clark, whose third network places the vertices of faces."""
+
+    def face_correction(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        """Return lengths along the normals of faces, (N, 1), of at most the budget."""
+        ...
+
+
 @dataclass(frozen=True)
 class Network:
     """One network of a model file: the input that it reads, its columns, and its output's."""
@@ -65,11 +79,14 @@ class Network:
 
 def networks(card: ModelCard) -> tuple[Network, ...]:
     """Return the networks that a file with this card holds."""
-    edges = Network("features", EDGE_FEATURES[card.features], "correction", 3)
-    if card.vertex_features is None:
-        return (edges,)
-    columns = VERTEX_FEATURES[card.vertex_features]
-    return edges, Network("vertex_features", columns, "vertex_correction", 3)
+    held = [Network("features", EDGE_FEATURES[card.features], "correction", 3)]
+    if card.vertex_features is not None:
+        columns = VERTEX_FEATURES[card.vertex_features]
+        held.append(Network("vertex_features", columns, "vertex_correction", 3))
+    if card.face_features is not None:
+        columns = FACE_FEATURES[card.face_features]
+        held.append(Network("face_features", columns, "face_correction", 1))
+    return tuple(held)
 
 
 class OnnxModel:
@@ -135,6 +152,18 @@ class OnnxModel:
                 finite or of another shape.
         """
         return self._answers("vertex_features", features, budget)
+
+    def face_correction(
+        self, features: Float[np.ndarray, "N K"], budget: float
+    ) -> Float32[np.ndarray, "N 1"]:
+        """Return lengths along the normals of faces, in [−budget, budget].
+
+        Raises:
+            ParameterError: features of another shape.
+            ModelError: the model has no face network, the graph fails, or an answer is not finite
+                or of another shape.
+        """
+        return self._answers("face_features", features, budget)
 
     def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
         network = self._networks.get(given)
