@@ -56,7 +56,7 @@ class Curves:
 def find_curves(
     points: Float[np.ndarray, "V 3"], mesh: Topology, row_count: int | None = None
 ) -> Curves:
-    """Find the curves of a mesh; ``row_count`` is that of the refined mesh's vertices, faces' too."""
+    """Find the curves of a mesh; ``row_count`` counts all vertices of the refined mesh."""
     count, kinds, sharp = mesh.vertex_count, mesh.edge_class, mesh.sharpest
     edge_count = len(mesh.edges)
     shared = np.zeros(row_count or count + edge_count, dtype=bool)

@@ -389,7 +389,13 @@ def guard_scale(
     shared = curves.shared if curves.shared.any() else NONE_SHARED
     blocks = level.blocks.quiet()
     mark = quads.mark_folds if level.base.polygons else children.mark_folds
-    of_mesh = mesh.corners, mesh.offsets, mesh.corner_edges, mesh.vertex_count, mesh.vertex_count + len(mesh.edges)
+    of_mesh = (
+        mesh.corners,
+        mesh.offsets,
+        mesh.corner_edges,
+        mesh.vertex_count,
+        mesh.vertex_count + len(mesh.edges),
+    )
     if not level.base.polygons:
         of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
     for rounds in rounds_from_0():

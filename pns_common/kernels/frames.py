@@ -106,7 +106,12 @@ def frames_and_features(
         features[to, LOGS + 2] = logs[ad] - logs[e]
         features[to, LOGS + 3] = logs[bd] - logs[e]
         if width > DIHEDRAL:
-            at_a, at_b, at_c, at_d = (four(fields, a), four(fields, b), four(fields, c), four(fields, d))
+            at_a, at_b, at_c, at_d = (
+                four(fields, a),
+                four(fields, b),
+                four(fields, c),
+                four(fields, d),
+            )
             _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d)
 
 

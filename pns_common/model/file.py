@@ -15,10 +15,11 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from onnx import ModelProto, NodeProto, ValueInfoProto
 
 DEFAULT_MODEL = "general"
+# Of a bundled model over Loop, the one that takes over on meshes of polygons.
+COMPANIONS: Mapping[str, str] = MappingProxyType({"general": "general-quad"})
 BUNDLED = resources.files("pns_common") / "models"
 MANIFEST = "SHA256SUMS"
 
@@ -78,7 +81,7 @@ def load_model(
         return OnnxModel(source, _listed_hash(BUNDLED, source, data), data, providers)
     path = Path(source)
     if not path.is_file():
-        names = ", ".join(bundled_models()) or "none"
+        names = ", ".join(bundled_models(companions=True)) or "none"
         raise ModelError(str(source), expected=f"a file or a bundled name ({names})", found="none")
     _check_size(path.stat().st_size, str(path))
     return model_from_bytes(path.read_bytes(), path.stem, providers)
@@ -90,13 +93,17 @@ def model_name(source: str | os.PathLike[str]) -> str:
 
 
 def _is_bundled(source: str | os.PathLike[str]) -> TypeGuard[str]:
-    return isinstance(source, str) and source in bundled_models()
+    return isinstance(source, str) and source in bundled_models(companions=True)
 
 
-def bundled_models() -> list[str]:
-    """Return the names of the model files that come with the package."""
-    names = (entry.name for entry in BUNDLED.iterdir())
-    return sorted(name.removesuffix(".onnx") for name in names if name.endswith(".onnx"))
+def bundled_models(*, companions: bool = False) -> list[str]:
+    """Return the names of the model files that come with the package.
+
+    Companions, which other models bring for meshes of polygons, are named if they are asked for.
+    """
+    files = (entry.name for entry in BUNDLED.iterdir())
+    names = {name.removesuffix(".onnx") for name in files if name.endswith(".onnx")}
+    return sorted(names if companions else names - set(COMPANIONS.values()))
 
 
 def model_from_bytes(data: bytes, name: str, providers: Sequence[str] = CPU) -> OnnxModel:

@@ -14,7 +14,7 @@ from pns_common.base_scheme import BaseScheme
 from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
-from pns_common.model.file import bundled_models, load_model
+from pns_common.model.file import COMPANIONS, load_model
 from pns_common.model.session import Model, PolygonModel
 from pns_common.operator import Rule
 from pns_common.parameters import is_number
@@ -23,8 +23,6 @@ from pns_common.schemes.loop import LOOP
 
 PAPER_FORMAT, LEARNED_ONCE = 1, 4
 BASES = {base.name: base for base in (LOOP, CATMULL_CLARK)}
-# The bundled model over Catmull–Clark that refines polygons for one over Loop.
-COMPANIONS = {"general": "general-quad"}
 NAMES = (LOOP.name, CATMULL_CLARK.name, "pns")
 
 
@@ -173,7 +171,7 @@ def _faces_at_unit_budget(
 def _companion(model: Model, budget: float | None) -> Callable[[], Scheme] | None:
     """Return what makes the scheme of a bundled model's companion for polygons, if it has one."""
     name = COMPANIONS.get(model.name)
-    return partial(_bundled, name, budget) if name in bundled_models() else None
+    return None if name is None else partial(_bundled, name, budget)
 
 
 def _bundled(name: str, budget: float | None) -> Scheme:
