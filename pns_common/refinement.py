@@ -18,7 +18,7 @@ from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.memory import keep_freed_memory, memory_here
-from pns_common.mesh import LARGEST_COORDINATE, Mesh, check_is_mesh
+from pns_common.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
 from pns_common.operator import Additions, learned_level
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
@@ -117,6 +117,11 @@ class Refinement:
         name, levels = self.scheme.name, len(self.steps)
         return f"Refinement({name!r}, levels={levels}, vertices={vertices}, faces={faces})"
 
+    def _repr_html_(self) -> str:
+        counts = {"scheme": self.scheme.name, "levels": len(self.steps)}
+        sizes = {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)}
+        return as_html(self.mesh, counts | sizes)
+
 
 def refine(
     mesh: Mesh,
@@ -170,18 +175,22 @@ def refine(
     told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
 
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
-    points, steps = mesh.vertices, list[Step]()
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    level, steps = level.with_creases(kept), list[Step]()
     for depth in range(count):
         if steps:
-            topology = scheme.base.split(topology, blocks, inherit=kept.sharp_at(depth))
-        steps.append(_step(Level(points, topology, scheme.base, length, blocks), scheme, depth))
-        points = steps[-1].points
+            topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
+            level = Level(steps[-1].points, topology, scheme.base, length, blocks)
+        steps.append(_step(level, scheme, depth))
+        level = steps[-1].level  # without measurements
         if told:
             told.level_ends()
-    faces, normals, shift = scheme.base.faces(topology, blocks, np.int64), None, 0.0
-    if limit:
-        last = scheme.base.split(topology, blocks)
+    points, normals, shift = steps[-1].points, None, 0.0
+    if not limit:
+        faces = scheme.base.faces(level.topology, blocks, np.int64)
+    else:
+        last = scheme.base.split(level.topology, blocks)
+        faces = last.corners.astype(np.int64).reshape(last.face_count, -1)
         surface = last, blocks, scheme.base
         shift = limit_shift(points, *surface)
         normals = limit_normals(points, *surface).vertices
@@ -238,9 +247,9 @@ def control_level(
     """
     blocks = Blocks(_threads(threads))
     kept = chosen_creases(creases, scheme.creases)
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
     length = _reference_length(mesh, reference_length, measured=True)
-    return Level(mesh.vertices, topology, scheme.base, length, blocks)
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    return level.with_creases(kept)
 
 
 def refine_many(

@@ -57,6 +57,7 @@ def print_model(model: OnnxModel) -> None:
         "budget C": card.budget,
         "orientation": card.orientation,
         **_further_rows(card),
+        "runs on": ", ".join(model.providers),
         "bytes": model.size,
         "sha256": model.hash,
     }

@@ -86,6 +86,14 @@ def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, p
     return count
 
 
+@kernel
+def read_links(low, links, begin, end, edges, half_edges):
+    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
+    for e in range(max(begin, 0), end):
+        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
+        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
+
+
 @inlined
 def _may_have_twin(corner_edges, links, f):
     """Return whether an earlier triangle may have the edges of triangle f; True if not known."""

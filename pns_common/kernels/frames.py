@@ -52,7 +52,9 @@ def frames_and_features(
     points,
     normals,
     fields,
+    lengths,
     logs,
+    bends,
     corners,
     edges,
     corner_edges,
@@ -63,6 +65,8 @@ def frames_and_features(
     symmetric,
     frames,
     curvature,
+    sides,
+    length,
     degenerate,
     features,
 ):
@@ -70,11 +74,14 @@ def frames_and_features(
 
     Args:
         fields: (V, 4) mean normals and umbrella heights; read by signed features alone.
-        logs: (E,) logarithms of the lengths.
+        lengths, logs: (E,) lengths and their logarithms.
+        bends: (F,) mean x over the edges of each face; (0,) where it is not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
+        sides: (N,) out: the smaller bend of both faces, 0 where there is no frame.
+        length: (N,) out: h.
         degenerate: (N,) out: whether the frame is the fallback.
         features: (N, K) out; K = 5, 14 or 18.
     """
@@ -99,7 +106,9 @@ def frames_and_features(
             x = 0.0
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
-        curvature[to], degenerate[to] = x, fallback
+        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
+        if len(bends):
+            sides[to] = 0.0 if fallback else min(bends[h1 // 3], bends[h2 // 3])
         features[to, 0] = x
         features[to, LOGS] = logs[ac] - logs[e]
         features[to, LOGS + 1] = logs[bc] - logs[e]
@@ -167,7 +176,9 @@ def polygon_frames_and_features(
     points,
     normals,
     fields,
+    lengths,
     logs,
+    bends,
     corners,
     offsets,
     face_of_corner,
@@ -178,6 +189,8 @@ def polygon_frames_and_features(
     end,
     frames,
     curvature,
+    sides,
+    length,
     degenerate,
     features,
 ):
@@ -193,13 +206,16 @@ def polygon_frames_and_features(
         h1, h2 = half_edges[e, 0], half_edges[e, 1]
         if corners[h1] != a:
             h1, h2 = h2, h1
-        n, m = row(normals, face_of_corner[h1]), row(normals, face_of_corner[h2])
+        f, g = face_of_corner[h1], face_of_corner[h2]
+        n, m = row(normals, f), row(normals, g)
         t, up, side, x, fallback = edge_frame(n, m, between(points, a, b))
         if fallback:
             x = 0.0
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
-        curvature[to], degenerate[to] = x, fallback
+        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
+        if len(bends):
+            sides[to] = 0.0 if fallback else min(bends[f], bends[g])
         c = wing(points, h1, corners, offsets, face_of_corner)
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)

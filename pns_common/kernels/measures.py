@@ -117,6 +117,18 @@ def measure_edges(
 
 
 @kernel
+def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, cosines):
+    """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
+    for e in range(max(begin, 0), end):
+        cosines[e] = 1.0
+        if edge_class[e] == INTERIOR:
+            n = row(normals, face_of(half_edges[e, 0], face_of_corner))
+            m = row(normals, face_of(half_edges[e, 1], face_of_corner))
+            if dot(n, n) > 0 and dot(m, m) > 0:
+                cosines[e] = dot(n, m)
+
+
+@kernel
 def mean_normals(corners, face_of_corner, reach, areas, begin, end, fields):
     """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4).
 
