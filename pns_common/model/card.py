@@ -1,8 +1,8 @@
 """The model card: what a model file says of itself, as JSON in its metadata.
 
 Format 1 is the paper's operator: one network for edges, at every level. Format 4 is the default's:
-networks for edges and for old vertices, a prior and a fold guard, at level 0 alone. Formats 2 and 3
-were never released.
+networks for edges and for old vertices, a prior and a fold guard, at level 0 alone; a third network
+may say how sharp edges are. Formats 2 and 3 were never released.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ RETIRED_FORMATS = (2, 3)
 FACE_FEATURES: Mapping[str, int] = MappingProxyType({"face-8": 8})
 EDGE_FEATURES: Mapping[str, int] = MappingProxyType({"paper-5": 5, "signed-18": 18})
 VERTEX_FEATURES: Mapping[str, int] = MappingProxyType({"ring-10": 10})
+SHARPNESS_FEATURES: Mapping[str, int] = MappingProxyType({"crease-53": 53})
 ORIENTATIONS = ("first-face", "symmetric")
 BASES = ("loop", "catmull-clark")
 # A prior of strength 1 is full quasi-interpolation; far beyond it squares leave the floats.
@@ -52,6 +53,8 @@ class ModelCard:
         sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
         face_features: Name of the feature set that the face network reads, over Catmull–Clark; None
             over Loop, which has no vertices in faces.
+        sharpness_features: Name of the feature set that the sharpness network reads; None: there is
+            none.
     """
 
     format: int
@@ -70,6 +73,7 @@ class ModelCard:
     fold_angle: float | None = None
     sharpness_levels: int | None = None
     face_features: str | None = None
+    sharpness_features: str | None = None
 
     def to_json(self) -> str:
         """Return the card as JSON, keys in the order of the attributes, without fields of None."""
@@ -97,7 +101,7 @@ class ModelCard:
 
 
 FORMAT_4_FIELDS = tuple(field.name for field in fields(ModelCard) if field.default is None)
-OPTIONAL_FIELDS = frozenset({"face_features"})
+OPTIONAL_FIELDS = frozenset({"face_features", "sharpness_features"})
 
 Range = tuple[Callable[[Any], bool], str]
 
@@ -129,6 +133,7 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
             lambda value: 0 <= value <= MOST_SHARPNESS_LEVELS,
             f"from 0 to {MOST_SHARPNESS_LEVELS}",
         ),
+        "sharpness_features": _one_of(SHARPNESS_FEATURES),
     }
 )
 

@@ -20,6 +20,7 @@ from pns_common.model.card import (
     CARD_KEY,
     EDGE_FEATURES,
     FACE_FEATURES,
+    SHARPNESS_FEATURES,
     VERTEX_FEATURES,
     ModelCard,
 )
@@ -33,7 +34,7 @@ CPU = ("CPUExecutionProvider",)
 
 @runtime_checkable
 class Model(Protocol):
-    """Networks with a card; every answer is a vector of norm ≤ budget."""
+    """Networks with a card; every correction is a vector of norm ≤ budget."""
 
     @property
     def card(self) -> ModelCard:
@@ -56,6 +57,10 @@ class Model(Protocol):
 
     def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
         """Return the weights of the ring vectors of old vertices, (N, 3); format 4 alone."""
+        ...
+
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
+        """Return the sharpness of edges, (N, 1); where the card names features for it alone."""
         ...
 
 
@@ -86,6 +91,9 @@ def networks(card: ModelCard) -> tuple[Network, ...]:
     if card.face_features is not None:
         columns = FACE_FEATURES[card.face_features]
         held.append(Network("face_features", columns, "face_correction", 1))
+    if card.sharpness_features is not None:
+        columns = SHARPNESS_FEATURES[card.sharpness_features]
+        held.append(Network("sharpness_features", columns, "sharpness", 1))
     return tuple(held)
 
 
@@ -167,6 +175,16 @@ class OnnxModel:
                 or of another shape.
         """
         return self._answers("face_features", features, budget)
+
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float32[np.ndarray, "N 1"]:
+        """Return the sharpness of edges.
+
+        Raises:
+            ParameterError: features of another shape.
+            ModelError: the model has no sharpness network, the graph fails, or an answer is not
+                finite or of another shape.
+        """
+        return self._answers("sharpness_features", features, 1.0)
 
     def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
         network = self._networks.get(given)

@@ -163,9 +163,12 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     )
     if card.face_features is not None:
         learned = replace(learned, face_network=partial(_faces_at_unit_budget, model))
-    creases = NO_CREASES
+    creases, is_learned = NO_CREASES, card.sharpness_features is not None
+    if is_learned:
+        learned = replace(learned, sharpness_network=partial(_sharpness, model))
     if budget > 0 and card.sharpness_levels:
-        creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
+        creases = Creases(learned=True) if is_learned else Creases(angle=ANGLE, seed=SEED)
+        creases = replace(creases, levels=card.sharpness_levels)
     return Scheme(
         "pns",
         BASES[card.base],
@@ -215,3 +218,7 @@ def _companion(model: Model, budget: float | None) -> Callable[[], Scheme] | Non
 
 def _bundled(name: str, budget: float | None) -> Scheme:
     return pns(load_model(name), budget)
+
+
+def _sharpness(model: Model, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
+    return model.sharpness(features)

@@ -52,6 +52,9 @@ class ModelEntry(BaseModel):
     sharpness_levels: int | None = Field(
         description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
     )
+    sharpness_features: str | None = Field(
+        description="feature set that says how sharp edges are; null where no network does"
+    )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

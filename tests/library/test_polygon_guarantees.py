@@ -58,6 +58,9 @@ class TiedModel:
     def vertex_correction(self, features, budget):
         return self._answers("ring-10", features, budget)
 
+    def sharpness(self, features):
+        raise AssertionError("the card names no sharpness network")
+
     def face_correction(self, features, budget):
         return self._answers("face-8", features, budget)[:, :1]
 
@@ -138,7 +141,7 @@ def test_scaling_a_mesh_scales_the_result(mesh, power):
 
 
 def correspondence(mesh, other, order):
-    """Where each new vertex of a mesh is in another with vertex ``order[v]`` for v."""
+    """Find where each new vertex of a mesh is in another with vertex ``order[v]`` for v."""
     ours, theirs = mesh.topology(), other.topology()
     places = {frozenset(ends): e for e, ends in enumerate(theirs.edges.tolist())}
     edges = [places[frozenset(order[list(ends)].tolist())] for ends in ours.edges.tolist()]

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from pns_common import ModelError
 from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 from train.models.recipe import Recipe
 
 
@@ -19,13 +19,15 @@ from train.models.recipe import Recipe
 class TorchModel:
     """Networks with a model card; they keep the library's `Model` protocol.
 
-    `vertex_network` goes with the card's vertex features.
+    `vertex_network` goes with the card's vertex features; `sharpness_network`, whose sigmoid is the
+    sharpness, with its sharpness features.
     """
 
     name: str
     card: ModelCard
     network: BoundedNet
     vertex_network: BoundedNet | None = None
+    sharpness_network: SharpNet | None = None
 
     @property
     def hash(self) -> str:
@@ -50,6 +52,19 @@ class TorchModel:
         if self.vertex_network is None:
             raise ModelError(self.name, expected="a vertex rule", found="none")
         return _answer(self.vertex_network, features, budget)
+
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
+        """Return the sharpness of edges.
+
+        Raises:
+            ModelError: there is no sharpness network.
+        """
+        if self.sharpness_network is None:
+            raise ModelError(self.name, expected="a sharpness network", found="none")
+        own = self.sharpness_network.linear_layers[0].weight.dtype
+        with torch.no_grad():
+            answer = self.sharpness_network(torch.from_numpy(features).to(own))
+            return torch.sigmoid(answer).numpy()
 
 
 def _answer(

@@ -114,9 +114,7 @@ def test_a_served_file_is_the_default_and_one_that_does_not_load_is_not_listed(
 def test_every_model_runs_on_the_providers_that_are_set() -> None:
     models = Models()
     models.hold(None, ("CPUExecutionProvider",))
-    assert all(
-        entry["providers"] == ["CPUExecutionProvider"] for entry in entries(models).values()
-    )
+    assert all(entry["providers"] == ["CPUExecutionProvider"] for entry in entries(models).values())
 
 
 def test_a_provider_that_is_not_there_is_named_with_those_that_are() -> None:
