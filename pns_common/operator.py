@@ -64,13 +64,13 @@ class Rule:
         gate_sharpness: c.
         budget: C.
         vertex_network: the network of old vertices; None leaves them to the base scheme.
-        face_network: the network of face vertices, where the base scheme has some; None: z = 0.
         vertex_gate_sharpness: c_v.
         prior_strength: s of d; None for equation 1.
         curve_strength: strength of d on boundaries and creases.
         network_scale: τ.
         fold_angle: θ in degrees, above 0 and below 90; read with a prior alone.
         feature_type: the floating type in which the networks read φ.
+        face_network: the network of face vertices, where the base scheme has some; None: z = 0.
         sharpness_network: ψ → sharpness in [0, 1], (N, 1) (sharpness.py); None: none is learned.
     """
 
@@ -80,13 +80,13 @@ class Rule:
     gate_sharpness: float
     budget: float
     vertex_network: Network | None = None
-    face_network: Network | None = None
     vertex_gate_sharpness: float = 1.0
     prior_strength: float | None = None
     curve_strength: float = 0.0
     network_scale: float = 1.0
     fold_angle: float = 75.0
     feature_type: type[np.floating[Any]] = np.float64
+    face_network: Network | None = None
     sharpness_network: Network | None = None
 
 
