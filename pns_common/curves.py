@@ -31,7 +31,7 @@ class Curves:
     """The curves of a mesh.
 
     Attributes:
-        movable: (V,) vertices on exactly two edges of curves and on no irregular edge.
+        movable: (V,) vertices on exactly two edges of curves and on no irregular edge, not pinned.
         rows: their numbers.
         sides: (N, 2) the two neighbours of each along the curve.
         a, b: (N, 3) from each to these.
@@ -67,6 +67,7 @@ def find_curves(
     edges = mesh.sharp_edges[kinds[mesh.sharp_edges] != connectivity.IRREGULAR]
     of_curve = np.bincount(mesh.edges[edges].reshape(-1), minlength=count)
     movable = (of_curve == TWO) & (mesh.sharp_count == TWO)
+    movable[mesh.pinned] = False
     rows = np.flatnonzero(movable)
     sides = sharp.neighbours[rows]
     a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))

@@ -12,7 +12,7 @@ from torch import Tensor
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.batch import joined_meshes
-from train.data.pairs.references import AUTHORED, LATHE, SWEPT, Pair
+from train.data.pairs.references import Pair
 from train.fitting.learned_level import LearnedLevel, learned_level
 from train.fitting.limit_maps import LimitMaps, applied, limit_maps
 from train.models.recipe import Recipe
@@ -30,7 +30,7 @@ SEEN_BACK = 6000
 FAIR = 2
 
 # Kinds that are to bend no more than quasi-interpolation makes them: smooth ones, and lathes'.
-SMOOTH_KINDS = ("grid", "sphere", LATHE, SWEPT)
+SMOOTH_KINDS = ("grid", "sphere", "lathe")
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         owner=owner,
         area=_shares(area, owner, len(pairs)),
         smooth_area=_shares(np.where(maps.smooth, area, 0.0), owner, len(pairs)),
-        authored=torch.tensor([kind == AUTHORED for kind in kinds]),
+        authored=torch.tensor([kind == "authored" for kind in kinds]),
         smooth=torch.tensor([kind in SMOOTH_KINDS for kind in kinds]),
         fair=fair,
         fair_edges=fair_edges,
