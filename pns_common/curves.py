@@ -53,10 +53,13 @@ class Curves:
     shared: Bool[np.ndarray, " W"]
 
 
-def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
-    """Find the curves of a mesh."""
+def find_curves(
+    points: Float[np.ndarray, "V 3"], mesh: Topology, row_count: int | None = None
+) -> Curves:
+    """Find the curves of a mesh; ``row_count`` counts all vertices of the refined mesh."""
     count, kinds, sharp = mesh.vertex_count, mesh.edge_class, mesh.sharpest
-    shared = np.zeros(count + len(mesh.edges), dtype=bool)
+    edge_count = len(mesh.edges)
+    shared = np.zeros(row_count or count + edge_count, dtype=bool)
     movable = np.zeros(count, dtype=bool)
     if sharp is None or len(mesh.sharp_edges) == 0:
         rows, pairs, none = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3))
@@ -74,7 +77,7 @@ def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
     along = points[ends[:, 1]] - points[ends[:, 0]]
     on_boundary = kinds == connectivity.BOUNDARY
     if on_boundary.any():
-        shared[:count], shared[count:] = movable, on_boundary
+        shared[:count], shared[count : count + edge_count] = movable, on_boundary
         shared[mesh.edges[mesh.crease_edges].reshape(-1)] = False
     squares = [(_square(a) + _square(b)) / 2, _square(along)]
     new_rows = np.concatenate([rows, count + edges])
