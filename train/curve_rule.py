@@ -62,12 +62,18 @@ class Curves:
 
     def pushes(self, gate_sharpness: float) -> Float[Tensor, "V 3"]:
         """Return d of all vertices, 0 where they are not movable; `gate_sharpness` is c_v."""
-        a, b = self.sides
-        turning, along, middle = 1 + dot(unit(a), unit(b)), unit(b - a), (a + b) / 2
-        fade = ((CORNER - turning) / (CORNER - BEND)).clamp(0, 1)
-        gate = self.movable * torch.tanh(gate_sharpness * turning) * fade
-        across = middle - dot(middle, along)[:, None] * along
-        return -(gate / 3)[:, None] * across
+        return self.movable[:, None] * curve_push(*self.sides, gate_sharpness)
 
     def _count(self, edges: Bool[Tensor, " E"]) -> Tensor:
         return torch.bincount(self.mesh.edges[edges].reshape(-1), minlength=self.mesh.vertex_count)
+
+
+def curve_push(
+    a: Float[Tensor, "V 3"], b: Float[Tensor, "V 3"], gate_sharpness: float
+) -> Float[Tensor, "V 3"]:
+    """Return d of vertices on curves, from the ways to both neighbours; `gate_sharpness` is c_v."""
+    turning, along, middle = 1 + dot(unit(a), unit(b)), unit(b - a), (a + b) / 2
+    fade = ((CORNER - turning) / (CORNER - BEND)).clamp(0, 1)
+    gate = torch.tanh(gate_sharpness * turning) * fade
+    across = middle - dot(middle, along)[:, None] * along
+    return -(gate / 3)[:, None] * across

@@ -15,7 +15,7 @@ from pns_common.features import FEATURE_COUNT, Symmetries
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
 
-INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12})
+INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12, "crease-53": 53})
 
 
 ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
@@ -40,11 +40,7 @@ class BoundedNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        widths = (feature_count, *hidden, 3)
-        layers: list[nn.Module] = []
-        for fan_in, fan_out in pairwise(widths):
-            layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]
-        self.net = nn.Sequential(*layers[:-1])
+        self.net = _perceptron((feature_count, *hidden, 3), activation, generator)
 
     def forward(
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
@@ -61,6 +57,38 @@ class BoundedNet(nn.Module):
     def linear_layers(self) -> list[nn.Linear]:
         """The layers that hold weights, from features to z."""
         return [layer for layer in self.net if isinstance(layer, nn.Linear)]
+
+
+class SharpNet(nn.Module):
+    """A small perceptron of one answer; its sigmoid is the sharpness of an edge."""
+
+    def __init__(
+        self,
+        feature_count: int,
+        hidden: tuple[int, ...],
+        activation: str,
+        generator: torch.Generator,
+    ):
+        super().__init__()
+        self.activation = activation
+        self.net = _perceptron((feature_count, *hidden, 1), activation, generator)
+
+    def forward(self, features: Float[Tensor, "N K"]) -> Float[Tensor, "N 1"]:
+        """Return the answer before the sigmoid."""
+        return self.net(features)
+
+    @property
+    def linear_layers(self) -> list[nn.Linear]:
+        """The layers that hold weights."""
+        return [layer for layer in self.net if isinstance(layer, nn.Linear)]
+
+
+class Networks(nn.Module):
+    """The networks of a scale-free rule."""
+
+    def __init__(self, edge: BoundedNet, vertex: BoundedNet, sharp: SharpNet):
+        super().__init__()
+        self.edge, self.vertex, self.sharp = edge, vertex, sharp
 
 
 class SymmetricNet(BoundedNet):
@@ -108,6 +136,15 @@ def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
 def _single(values: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
     # Every entry is 1 or −1: exact in any precision that the network is turned to.
     return torch.from_numpy(values.astype(np.float32))
+
+
+def _perceptron(
+    widths: tuple[int, ...], activation: str, generator: torch.Generator
+) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for fan_in, fan_out in pairwise(widths):
+        layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]
+    return nn.Sequential(*layers[:-1])
 
 
 def _seeded_linear(fan_in: int, fan_out: int, generator: torch.Generator) -> nn.Linear:
