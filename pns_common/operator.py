@@ -49,8 +49,8 @@ ROUNDS = 30
 SATURATED = 22.0
 EVERYWHERE, NONE_SHARED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
 
-# Features (N, K) → answers (N, 3).
-Network = Callable[[Float[np.ndarray, "N K"]], Float[np.ndarray, "N 3"]]
+# Features (N, K) → answers (N, A).
+Network = Callable[[Float[np.ndarray, "N K"]], Float[np.ndarray, "N A"]]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ class Rule:
         curve_strength: strength of d on boundaries and creases.
         network_scale: τ.
         fold_angle: θ in degrees, above 0 and below 90; read with a prior alone.
+        sharpness_network: ψ → sharpness in [0, 1], (N, 1) (sharpness.py); None: none is learned.
     """
 
     edge_network: Network
@@ -82,6 +83,7 @@ class Rule:
     curve_strength: float = 0.0
     network_scale: float = 1.0
     fold_angle: float = 75.0
+    sharpness_network: Network | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,15 +308,27 @@ def answers(network: Network | None, at: Inputs) -> Float[np.ndarray, "N 3"]:
         return made
     every = is_open.all()
     asked = at.features if every else at.features[is_open]
-    z = np.asarray(network(asked))
+    made[slice(None) if every else is_open] = checked_answers(network, asked, columns=3)
+    return made
+
+
+def checked_answers(
+    network: Network, features: Float[np.ndarray, "N K"], columns: int
+) -> Float[np.ndarray, "N A"]:
+    """Return a network's answers.
+
+    Raises:
+        ModelError: an answer is not finite, or has another shape.
+    """
+    z = np.asarray(network(features))
     if z.dtype.kind not in "fiub":
         raise ModelError("network", expected="real numbers", found=f"{z.dtype}")
-    if z.shape != (len(asked), 3):
-        raise ModelError("network", expected=f"shape ({len(asked)}, 3)", found=f"{z.shape}")
+    if z.shape != (len(features), columns):
+        expected = f"shape ({len(features)}, {columns})"
+        raise ModelError("network", expected=expected, found=f"{z.shape}")
     if not np.isfinite(z).all():
-        raise ModelError("network", expected="finite corrections", found="NaN or infinity")
-    made[slice(None) if every else is_open] = z
-    return made
+        raise ModelError("network", expected="finite answers", found="NaN or infinity")
+    return z
 
 
 # --- the guard ------------------------------------------------------------------------------------
