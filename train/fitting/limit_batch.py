@@ -23,8 +23,8 @@ from train.models.recipe import Recipe
 # Meshes stand so far apart that the nearest point of all surfaces is one of a mesh's own.
 APART = 16.0
 
-# Points of the surfaces from which the limit is looked at.
-SEEN_BACK = 4000
+# Faces of the limit from which the surfaces are looked at, and points of these that look back.
+SEEN, SEEN_BACK = 6000, 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class LimitBatch:
         count: N.
         level: the control meshes.
         limit: from the points after two levels to their limit.
-        faces: of these, and the mesh that `owner` each belongs to.
+        faces: some of the faces of these, drawn evenly, and the mesh that each belongs to.
         area: each face's share of its mesh's area, summing to 1 a mesh.
         sharp: how far each interior edge is sharp in truth; NaN where that is not clear.
         tree: of all surfaces' points.
@@ -79,9 +79,11 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         mesh = connect(mesh.split().numpy(), mesh.vertex_count + len(mesh.edges))
     limit = sparse.csr_array(limit_mask(mesh).matrix())
     owner = np.repeat(np.arange(len(pairs)), [16 * len(pair.coarse.faces) for pair in pairs])
+    seen = np.sort(rng.choice(len(owner), min(SEEN, len(owner)), replace=False))
+    faces, owner = mesh.faces.numpy()[seen], owner[seen]
     smooth = level.smooth_sharpness()
     ends = applied(limit, level.second(smooth, level.first(smooth, None))).numpy()
-    a, b, c = (ends[mesh.faces[:, corner].numpy()] for corner in range(3))
+    a, b, c = (ends[faces[:, corner]] for corner in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = _joined(pair.surface.points + at for pair, at in zip(pairs, shifts, strict=True))
     normals = _joined(pair.surface.normals for pair in pairs)
@@ -93,7 +95,7 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         count=len(pairs),
         level=level,
         limit=limit,
-        faces=mesh.faces.numpy(),
+        faces=faces,
         owner=owner,
         area=torch.from_numpy(area / np.maximum(np.bincount(owner, area), 1e-300)[owner]),
         sharp=torch.from_numpy(sharp),

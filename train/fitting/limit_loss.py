@@ -5,13 +5,11 @@ An error of 1 is the base scheme's own, so that gentle surfaces count as much as
 others.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
-import igl
-import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from train.fitting.limit_batch import LimitBatch
@@ -35,8 +33,8 @@ class LimitMeasures:
     """Of each of N limit surfaces; lengths, and chords between unit normals.
 
     Attributes:
-        mean, spread, peak: mean, root mean square and soft maximum of the distance, from the limit
-            and from the surface.
+        mean, spread, peak: mean, root mean square and soft maximum of the distance along the normal
+            of the surface, from the limit and from the surface.
         normal: mean difference of normals.
     """
 
@@ -52,16 +50,14 @@ def measure(batch: LimitBatch, second: Float[Tensor, "M 3"]) -> LimitMeasures:
     corners = limit[batch.faces]
     a, b, c = corners.unbind(dim=1)
     centres, normals = (a + b + c) / 3, unit(torch.linalg.cross(b - a, c - a))
-    at, from_points = centres.detach().numpy(), batch.points[batch.back]
-    with ThreadPoolExecutor(1) as beside:
-        search = beside.submit(batch.tree.query, at)
-        face, shares = _nearest(limit.detach().numpy(), batch.faces, from_points)
-        nearest = search.result()[1]
+    points, true_points = limit.detach().numpy(), batch.points[batch.back]
+    nearest = batch.tree.query(centres.detach().numpy())[1]
+    nearest_back = KDTree(points).query(true_points)[1]
     there, true = (torch.from_numpy(table[nearest]) for table in (batch.points, batch.normals))
     away = dot(centres - there, true).abs()
     wrong = torch.sqrt(((normals - true) ** 2).sum(dim=1) + BLUNT)
-    seen = (shares[:, :, None] * corners[face]).sum(dim=1) - torch.from_numpy(from_points)
-    back = torch.sqrt(dot(seen, seen) + TINY)
+    offset = limit[nearest_back] - torch.from_numpy(true_points)
+    back = dot(offset, torch.from_numpy(batch.normals[batch.back])).abs()
     ones = torch.ones_like(back)
     back_share = ones / batch.per_mesh(ones, batch.back_owner).clamp(min=1)[batch.back_owner]
 
@@ -77,18 +73,6 @@ def measure(batch: LimitBatch, second: Float[Tensor, "M 3"]) -> LimitMeasures:
         peak=(mean(away**PEAK, back**PEAK) + TINY) ** (1 / PEAK),
         normal=batch.per_mesh(batch.area * wrong, batch.owner),
     )
-
-
-def _nearest(points: np.ndarray, faces: np.ndarray, to: np.ndarray) -> tuple[np.ndarray, Tensor]:
-    """Return the nearest faces of a mesh, and the shares of their corners in the nearest points."""
-    tree = igl.AABB()
-    points, faces = np.ascontiguousarray(points), np.ascontiguousarray(faces)
-    tree.init(points, faces)
-    _, face, at = tree.squared_distance(points, faces, to)
-    a, b, c = (points[faces[face, corner]] for corner in range(3))
-    shares = igl.barycentric_coordinates(np.asarray(at), a, b, c)
-    sound = np.isfinite(shares).all(axis=1, keepdims=True)
-    return np.asarray(face), torch.from_numpy(np.where(sound, shares, 1 / 3))
 
 
 def limit_loss(

@@ -63,17 +63,24 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
     return _keeping_symmetry(recipe, seen, recipe.vertex.hidden, generator)
 
 
+def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
+    """Return the untrained sharpness network of a recipe; None where it has none."""
+    seen = recipe.sharpness
+    if seen is None:
+        return None
+    generator = torch.Generator().manual_seed(SHARP_SEED + recipe.seed)
+    return SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+
+
 def initial_networks(recipe: Recipe) -> Networks:
     """Return the untrained networks of a scale-free recipe.
 
     Raises:
         ParameterError: it has no vertex rule, or no sharpness network.
     """
-    vertex, seen = initial_vertex_network(recipe), recipe.sharpness
-    if vertex is None or seen is None:
+    vertex, sharp = initial_vertex_network(recipe), initial_sharpness_network(recipe)
+    if vertex is None or sharp is None:
         raise ParameterError("recipe", recipe.name, expected="three networks")
-    generator = torch.Generator().manual_seed(SHARP_SEED + recipe.seed)
-    sharp = SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
     return Networks(initial_network(recipe), vertex, sharp)
 
 

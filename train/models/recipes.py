@@ -103,7 +103,7 @@ def general(seed: int = 0) -> Recipe:
             weights=LimitWeights(
                 mean=1.0, spread=0.5, peak=0.7, normal=3.0, worse=1.5, worse_from=0.95, sharp=0.3
             ),
-            faces=900,
+            faces=600,
             pool=60,
             reuse=30,
             start=1000,
