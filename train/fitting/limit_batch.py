@@ -14,7 +14,7 @@ from pns_common import Mesh
 from train.connectivity import connect
 from train.data.batch import joined_meshes
 from train.data.pairs.references import Pair
-from train.data.sharp_truth import truly_sharp
+from train.data.sharp_labels import coarse_sharp_edges
 from train.fitting.learned_level import LearnedLevel, learned_level
 from train.fitting.limit_maps import applied
 from train.loop_masks import limit_mask
@@ -37,7 +37,7 @@ class LimitBatch:
         limit: from the points after two levels to their limit.
         faces: some of the faces of these, drawn evenly, and the mesh that each belongs to.
         area: each face's share of its mesh's area, summing to 1 a mesh.
-        sharp: how far each interior edge is sharp in truth; NaN where that is not clear.
+        sharp: which interior edges are sharp in truth.
         tree: of all surfaces' points.
         points, normals: of all surfaces.
         back: the surfaces' points from which the limit is looked at.
@@ -89,8 +89,7 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
     normals = _joined(pair.surface.normals for pair in pairs)
     from_mesh = np.repeat(np.arange(len(pairs)), [len(pair.surface.points) for pair in pairs])
     back = np.sort(rng.choice(len(surface), min(SEEN_BACK, len(surface)), replace=False))
-    tree = KDTree(surface)
-    sharp = truly_sharp(joined, tree, normals)[level.interior.numpy()]
+    sharp = _joined(coarse_sharp_edges(pair) for pair in pairs)[level.interior.numpy()]
     return LimitBatch(
         count=len(pairs),
         level=level,
@@ -98,8 +97,8 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         faces=faces,
         owner=owner,
         area=torch.from_numpy(area / np.maximum(np.bincount(owner, area), 1e-300)[owner]),
-        sharp=torch.from_numpy(sharp),
-        tree=tree,
+        sharp=torch.from_numpy(sharp).double(),
+        tree=KDTree(surface),
         points=surface,
         normals=normals,
         back=back,

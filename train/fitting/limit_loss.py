@@ -24,6 +24,9 @@ TINY = 1e-30
 # Squared chord below which the angle between normals is rounded off.
 BLUNT = 1e-6
 
+# No edge counts as surer than this.
+LEAST_W = 1e-6
+
 # Errors below these (in R; chords of unit normals) are as good as none.
 DISTANCE_FLOOR, NORMAL_FLOOR = 1e-4, 4e-3
 
@@ -91,7 +94,6 @@ def limit_loss(
 
 
 def sharpness_loss(batch: LimitBatch, logits: Float[Tensor, " I"]) -> Float[Tensor, ""]:
-    """Return the mean cross entropy of w and truth, where that is clear."""
-    w = (batch.level.cap * torch.sigmoid(logits)).clamp(1e-6, 1 - 1e-6)
-    clear = ~torch.isnan(batch.sharp)
-    return torch.nn.functional.binary_cross_entropy(w[clear], batch.sharp[clear])
+    """Return the mean cross entropy of w and truth."""
+    w = (batch.level.cap * torch.sigmoid(logits)).clamp(LEAST_W, 1 - LEAST_W)
+    return torch.nn.functional.binary_cross_entropy(w, batch.sharp)

@@ -24,9 +24,6 @@ BLOCKS = 0.6
 # How often a convex one is a box, or a prism; else the hull of random points.
 BOXES, PRISMS = 0.2, 0.4
 
-# How often it is left as it is, with as few faces as modellers draw.
-AS_DRAWN = 0.25
-
 # Cells along each side of a block's grid.
 CELLS = 5
 
@@ -40,8 +37,6 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     if made is None:
         return None
     points, faces = made
-    if rng.random() < AS_DRAWN:
-        return Pair("faceted", Mesh(points, faces), sampled(points, faces, rng))
     dense, triangles = points, faces
     while len(triangles) < FEWEST_FACES:
         level = connect(triangles, len(dense))
@@ -100,11 +95,11 @@ def _corners(rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return signs * size
     if kind < BOXES + PRISMS:
-        count, taper = int(rng.integers(3, 8)), rng.uniform(0.3, 1.0)
+        count, taper = int(rng.integers(3, 13)), rng.uniform(0.3, 1.0)
         angle = 2 * np.pi * np.arange(count) / count
         ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
         return np.concatenate([ring - [0, 0, 1], ring * [taper, taper, 1] + [0, 0, 1]]) * size
-    return rng.normal(size=(int(rng.integers(6, 16)), 3)) * size
+    return rng.normal(size=(int(rng.integers(6, 25)), 3)) * size
 
 
 def _hull(

@@ -2,15 +2,20 @@
 
 Modellers draw a wall with one quad from rim to rim however long it is, and a tip as one fan. Long
 thin faces between a sharp rim and gentle bends come from nowhere else. With many sides the part
-stands for what turns round, with few for the polyhedron itself.
+stands for what turns round, with few for the polyhedron itself; but a pyramid of few sides, which
+says too little of any surface, for what quasi-interpolation makes of it.
 """
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
-from pns_common import Mesh
+from pns_common import Mesh, loop
+from train.connectivity import connect
 from train.data.pairs.faceted import sampled
 from train.data.pairs.references import LATHE, Pair
+from train.refining import refine
+from train.surfaces.quasi_interpolation import normal_push
 from train.surfaces.solids import random_rotation
 
 FEWEST_SIDES, MOST_SIDES = 3, 40
@@ -19,6 +24,8 @@ FEW, ROUND = 0.25, 7
 
 # Sides, at least, of the mesh that stands for a round part.
 FINE = 180
+
+FINE_LEVELS = 4
 
 # Straight pieces of the outline, and how often.
 PIECES = {1: 0.5, 2: 0.2, 3: 0.2, 4: 0.1}
@@ -42,6 +49,10 @@ def lathe_pair(rng: np.random.Generator) -> Pair:
     fine = coarse
     if sides >= ROUND:
         fine = turned(outline, sides * -(-FINE // sides), np.array([True, True]))
+    elif tips.any():
+        points, level = torch.tensor(coarse.vertices), connect(coarse.faces, len(coarse.vertices))
+        pushed = Mesh((points + normal_push(points, level)).numpy(), coarse.faces)
+        fine = refine(pushed, loop(), FINE_LEVELS).mesh
     turn = random_rotation(rng)
     surface = sampled(fine.vertices @ turn, fine.faces, rng)
     return Pair(LATHE, Mesh(coarse.vertices @ turn, coarse.faces), surface)

@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, parts of a lathe, and swept profiles.
+solids of plane faces, control meshes that were made for Loop, parts of a lathe, and swept profiles.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pns_common.reference_length import measure_reference_length
+from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair
@@ -20,12 +21,13 @@ from train.data.pairs.swept import swept_pair
 # How often each draws a pair, in the order that a seed means; the rest are solids.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.08,
+        patch_pair: 0.14,
         grid_pair: 0.12,
         sphere_pair: 0.05,
-        faceted_pair: 0.20,
-        lathe_pair: 0.12,
-        swept_pair: 0.08,
+        faceted_pair: 0.14,
+        authored_pair: 0.08,
+        lathe_pair: 0.09,
+        swept_pair: 0.10,
     }
 )
 
