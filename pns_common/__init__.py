@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pns_common.mesh import Mesh, clean
     from pns_common.model.file import load_model
     from pns_common.refinement import Refinement, refine, refine_many
-    from pns_common.schemes import Scheme, loop, pns
+    from pns_common.schemes import Scheme, catmull_clark, loop, pns
     from pns_common.version import VERSION as __version__  # noqa: N811
     from pns_common.warming import warm_up
 
@@ -45,6 +45,7 @@ _HOMES = {
     "PnsError": "errors",
     "Refinement": "refinement",
     "Scheme": "schemes",
+    "catmull_clark": "schemes",
     "clean": "mesh",
     "load_model": "model.file",
     "loop": "schemes",
@@ -66,6 +67,7 @@ __all__ = [
     "Refinement",
     "Scheme",
     "__version__",
+    "catmull_clark",
     "clean",
     "load_model",
     "loop",

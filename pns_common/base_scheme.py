@@ -10,8 +10,10 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.sectors import LimitNormals
+from pns_common.topology import Topology, split_faces
 
+WIDTH = 3
 Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]
 
 
@@ -25,6 +27,28 @@ class Split(Protocol):
 
 
 @dataclass(frozen=True)
+class Limit:
+    """A scheme's limit: what its masks become when they are applied for ever.
+
+    Attributes:
+        positions: returns the limits of any columns of a mesh's vertices.
+        normals: returns the normals of the limit surface there.
+        ring_weight: of a smooth vertex of valence k, the weight of its neighbours' mean where the
+            limit is made of that and the vertex alone; None: it is not.
+    """
+
+    positions: Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "V K"]] = (
+        field(repr=False)
+    )
+    normals: Callable[[Float[np.ndarray, "V 3"], Topology, Blocks], LimitNormals] = field(
+        repr=False
+    )
+    ring_weight: Callable[[Integer[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
+        default=None, repr=False
+    )
+
+
+@dataclass(frozen=True)
 class BaseScheme:
     """A linear subdivision scheme. Its masks have rows ≥ 0 that sum to 1.
 
@@ -32,13 +56,33 @@ class BaseScheme:
         name: its name in reports and on model cards.
         place: applies the masks of one level to any columns: rows of old vertices, then new ones.
         split: splits the faces.
-        limit_weight: of a smooth vertex of valence k, the weight of its neighbours' mean in the
-            limit mask; the learned rule's prior is made of it. None for schemes without one.
+        faces: returns the faces of the split alone, in the order of ``split``.
+        polygons: whether it splits faces of any degree, into a quad for each corner; else it splits
+            triangles in four.
+        limit: its limit masks; the learned rule's prior is made of them. None for schemes without.
     """
 
     name: str
     place: Place = field(repr=False)
     split: Split = field(repr=False)
-    limit_weight: Callable[[Integer[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
-        default=None, repr=False
-    )
+    faces: Callable[..., Integer[np.ndarray, "C N"]] = field(default=split_faces, repr=False)
+    polygons: bool = field(default=False, repr=False)
+    limit: Limit | None = field(default=None, repr=False)
+
+
+def in_threes(
+    values: Float[np.ndarray, "V K"],
+    rows: int,
+    masks: Callable[[Float[np.ndarray, "V 3"]], Float[np.ndarray, "R 3"]],
+) -> Float[np.ndarray, "R K"]:
+    """Apply masks, which take three columns and return so many rows, to any number of columns."""
+    width = values.shape[1]
+    if width == WIDTH:
+        return masks(np.ascontiguousarray(values, dtype=np.float64))
+    placed = np.empty((rows, width))
+    for start in range(0, width, WIDTH):
+        given = values[:, start : start + WIDTH]
+        three = np.zeros((len(values), WIDTH))
+        three[:, : given.shape[1]] = given
+        placed[:, start : start + WIDTH] = masks(three)[:, : given.shape[1]]
+    return placed

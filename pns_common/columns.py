@@ -10,16 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Integer, Real
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases
-from pns_common.errors import ParameterError
+from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import columns as kernels
 from pns_common.limit import limit_positions
-from pns_common.mesh import check_faces
+from pns_common.mesh import as_polygons
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
 from pns_common.topology import Topology, build_topology
@@ -29,7 +30,7 @@ TOGETHER = 12
 
 
 def level_topologies(
-    faces: Integer[np.ndarray, "F 3"],
+    faces: Any,
     vertex_count: int,
     levels: int,
     creases: Creases = NO_CREASES,
@@ -38,15 +39,19 @@ def level_topologies(
 ) -> list[Topology]:
     """Return the topologies of the meshes that ``levels`` steps refine, control mesh first.
 
-    The creases are those that are named: without positions none is found by its angle.
+    The creases are those that are named: without positions none is found by its angle. Faces are
+    as ``Mesh`` takes them, or none.
 
     Raises:
-        MeshError: wrong shape or type of the faces, or an index out of range.
+        MeshError: wrong shape or type of the faces, an index out of range, or polygons for a scheme
+            of triangles.
         ParameterError: a crease is no edge.
     """
-    check_faces(faces, vertex_count)
+    corners, offsets = as_polygons(faces, vertex_count)
     blocks = blocks or Blocks()
-    topologies = [build_topology(faces, vertex_count, blocks)]
+    topologies = [build_topology((corners, offsets), vertex_count, blocks)]
+    if not (topologies[0].triangles or base.polygons):
+        raise MeshError("polygons, expected triangles", element="faces")
     if creases.named is not None and creases.sharp_at(0):
         topologies[0] = topologies[0].with_creases(topologies[0].rows_of(creases.named))
     for depth in range(1, levels):
@@ -113,7 +118,7 @@ class ColumnRefinement:
         values = np.asarray(columns, dtype=np.float64)
         for topology in self.topologies:
             values = self.base.place(values, topology, self.blocks)
-        return limit_positions(values, self.last, self.blocks) if self.limit else values
+        return limit_positions(values, self.last, self.blocks, self.base) if self.limit else values
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,10 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh, check_is_mesh
-from pns_common.normals import face_normals
+from pns_common.normals import measure_faces
+from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import Topology, build_topology
+from pns_common.topology import Topology
 
 # ``crease=auto``: edges that turn by more than ANGLE degrees and are connected, by such edges, to
 # one that turns by more than SEED.
@@ -99,7 +100,7 @@ def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "
     """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
 
     Args:
-        mesh: a mesh of triangles.
+        mesh: a mesh of any polygons.
         angle: edges that turn by more than so many degrees. None: those that turn by more than 40
             and are connected by such edges to one that turns by more than 60.
 
@@ -108,7 +109,7 @@ def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "
     """
     check_is_mesh(mesh)
     creases = AUTOMATIC if angle is None else Creases(angle=angle)
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     return topology.edges[creases.found(mesh.vertices, topology)].astype(np.int64)
 
 
@@ -129,10 +130,10 @@ def chosen_creases(
 
 def edge_cosines(points: Float[np.ndarray, "V 3"], topology: Topology) -> Float[np.ndarray, " E"]:
     """Return n1 · n2 of interior edges; 1 at other edges and beside faces without area."""
-    normals = face_normals(points, topology.faces)
+    normals, _ = measure_faces(points, topology, Blocks(), areas=False)
     cosine = np.ones(len(topology.edges))
     rows = topology.interior
-    sides = topology.half_edges[rows] // 3
+    sides = topology.face_of(topology.half_edges[rows])
     n, m = normals[sides[:, 0]], normals[sides[:, 1]]
     known = n.any(axis=1) & m.any(axis=1)
     cosine[rows] = np.where(known, np.einsum("ij,ij->i", n, m), 1.0)

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import connectivity, measures
-from pns_common.normals import NO_AREAS
+from pns_common.normals import NO_AREAS, measure_faces
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
 
@@ -72,15 +72,7 @@ class Level:
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
         """Unit normals, and twice the area vectors with their lengths."""
-        triangles = self.topology.faces
-        normals, areas = np.empty((len(triangles), 3)), np.empty((len(triangles), 4))
-        self.blocks.run(
-            len(triangles),
-            lambda begin, end: measures.measure_faces(
-                self.points, triangles, begin, end, normals, areas
-            ),
-        )
-        return normals, areas
+        return measure_faces(self.points, self.topology, self.blocks, areas=True)
 
     @property
     def normals(self) -> Float[np.ndarray, "F 3"]:

@@ -1,319 +1,69 @@
-"""Loop's limit surface at the vertices of a mesh: exact positions and normals.
-
-A limit mask is a left eigenvector of the local subdivision matrix for its eigenvalue 1. By the
-number of sharp edges (boundary, irregular, crease) at a vertex:
-
-    none       (1 − w_k) p + w_k (mean of the neighbours)      w_k of ``loop.limit_ring_weight``
-    one        (a dart) p + Σ w_j q_j, over 1 + Σ w_j
-               smooth spokes: w_j = β_k + 3/8 w_j + 1/8 (those beside it, but for the sharp one)
-               the sharp one: w_s = β_k + 1/2 w_s + 1/8 (both beside it)
-    two        (4 p + the two neighbours along the curve) / 6
-    more       p, which never moves
-
-All weights are ≥ 0 and sum to 1, so two control meshes that are ε apart have limits within ε.
-Soft edges blend the rules as they do in refinement. For normals they count as smooth.
-
-Tangent masks are left eigenvectors for the subdominant eigenvalues; their cross product is the
-normal. With q_0 … q_k the neighbours of p in a sector of k faces, anticlockwise:
-
-    closed     Σ cos(2πj/k) q_j  and  Σ sin(2πj/k) q_j
-    curve      q_0 − q_k  and  c p + a (q_0 + q_k) + Σ sin(πj/k) q_j                      0 < j < k
-               a = (sin(π/k) − S) / (8 λ − 2), c = −S − 2 a, S = Σ sin(πj/k),
-               λ = 3/8 + cos(π/k) / 4; for k = 1 the second difference, a = 1/2, c = −1
-    corner     q_0 − p  and  q_k − p
-    dart       Σ sin(2πj/k) q_j and the even eigenvector, of which one number is solved for
-
-At k = 3 the curve's are the masks of Hoppe et al. 1994 for a regular crease; elsewhere theirs
-belong to their own rules next to creases, which are not the ones used here. Where another mode
-shrinks no faster than these, Loop's surface has no tangent plane, and we call the plane of both
-tangents so: on curves from k = 6 on (Σ sin(2πj/k) q_j), at corners from k = 3 on (Σ sin(πj/k) q_j).
-"""
+"""The limit surface at the vertices of a mesh, by the base scheme's limit masks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
-from jaxtyping import Float, Integer, Shaped
+from jaxtyping import Float
 
-from pns_common.kernels import limit as kernels
-from pns_common.kernels import loop as masks
+from pns_common.base_scheme import BaseScheme, Limit
+from pns_common.errors import ParameterError
 from pns_common.parallel import Blocks
-from pns_common.schemes.loop import LOOP, WIDTH, beta, in_threes, limit_ring_weight
+from pns_common.schemes.loop import LOOP
+from pns_common.sectors import LimitNormals
 from pns_common.topology import Topology
-
-CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
-# Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.
-FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
-# From so many spokes on the even mask of a dart has one form.
-MANY = 9
-CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
-
-
-@dataclass(frozen=True, eq=False)
-class LimitNormals:
-    """Unit normals; 0 where there is no area, and where those of a vertex's sectors cancel.
-
-    Attributes:
-        vertices: of each vertex; on a crease or where fans meet the unit mean of its sectors'.
-        sectors: of each sector: one-sided at boundaries and creases.
-        sector_of_corner: the sector of corner 3 f + i, for a normal at each face's corner.
-    """
-
-    vertices: Float[np.ndarray, "V 3"]
-    sectors: Float[np.ndarray, "S 3"]
-    sector_of_corner: Integer[np.ndarray, " C"]
-
-
-@dataclass(frozen=True, eq=False)
-class Sectors:
-    """The corners around vertices between two sharp edges, or around a whole closed fan.
-
-    Attributes:
-        of_corner: the sector of each corner.
-        first: the first corner of each sector, anticlockwise.
-        size: how many corners it has.
-        opened: how many sectors are open; these come first.
-        vertex: of each sector.
-    """
-
-    of_corner: Integer[np.ndarray, " C"]
-    first: Integer[np.ndarray, " S"]
-    size: Integer[np.ndarray, " S"]
-    opened: int
-    vertex: Integer[np.ndarray, " S"]
 
 
 def limit_positions(
-    points: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks | None = None
+    points: Float[np.ndarray, "V K"],
+    topology: Topology,
+    blocks: Blocks | None = None,
+    base: BaseScheme = LOOP,
 ) -> Float[np.ndarray, "V K"]:
-    """Return the limit of each vertex, or of any columns that Loop's masks refine."""
-    blocks = blocks or Blocks()
-    limits = _limits(points, topology, blocks)
+    """Return the limit of each vertex, or of any columns that the scheme's masks refine.
+
+    Raises:
+        ParameterError: the scheme has no limit masks.
+    """
+    masks, blocks = _masks(base), blocks or Blocks()
+    limits = masks.positions(points, topology, blocks)
     loops = topology.edges[topology.edges[:, 0] == topology.edges[:, 1], 0]
     if len(loops):
         # Around a face that names a vertex twice an edge may lead from a vertex to itself. The
         # next mesh does not have that edge.
-        refined = LOOP.place(points, topology, blocks)
-        limits[loops] = _limits(refined, LOOP.split(topology, blocks), blocks)[loops]
+        refined = base.place(points, topology, blocks)
+        limits[loops] = masks.positions(refined, base.split(topology, blocks), blocks)[loops]
     return limits
 
 
 def limit_shift(
-    points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks | None = None
+    points: Float[np.ndarray, "V 3"],
+    topology: Topology,
+    blocks: Blocks | None = None,
+    base: BaseScheme = LOOP,
 ) -> float:
     """Return how far creases move the limit of a vertex, at most; 0 without creases."""
     if len(topology.crease_edges) == 0 and len(topology.soft) == 0:
         return 0.0
-    smooth = limit_positions(points, topology.without_creases(), blocks)
-    moved = limit_positions(points, topology, blocks) - smooth
+    smooth = limit_positions(points, topology.without_creases(), blocks, base)
+    moved = limit_positions(points, topology, blocks, base) - smooth
     return float(np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0)))
 
 
 def limit_normals(
-    points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks | None = None
-) -> LimitNormals:
-    """Return the normals of the limit surface at the limits of the vertices."""
-    mesh, around = topology, find_sectors(topology)
-    kind = np.zeros(len(around.first), dtype=np.int64)
-    if around.opened:
-        kind[: around.opened] = np.minimum(mesh.sharp_count[around.vertex[: around.opened]], CORNER)
-    at, weights = _tables(tangent_mask, kind, around.size)
-    sectors = np.empty((len(around.first), 3))
-    read = points, *_walked(mesh), around.first, around.size, at, weights, kind == CORNER
-    (blocks or Blocks()).run(
-        len(sectors), lambda begin, end: kernels.sector_normals(*read, begin, end, sectors)
-    )
-    vertices, lengths = np.zeros((mesh.vertex_count, 3)), np.zeros(mesh.vertex_count)
-    kernels.mean_of_sectors(sectors, around.vertex, vertices, lengths)
-    return LimitNormals(vertices, sectors, around.of_corner)
-
-
-def find_sectors(topology: Topology) -> Sectors:
-    """Return the sectors of a mesh of triangles."""
-    corners, *edges = _walked(topology)
-    of_corner = np.full(len(corners), -1, dtype=np.int32)
-    first, size = np.empty((2, len(corners)), dtype=np.int32)
-    opened, count = kernels.label_sectors(*edges, of_corner, first, size)
-    first = first[:count].copy()
-    return Sectors(of_corner, first, size[:count].copy(), opened, corners[first])
-
-
-def _walked(topology: Topology) -> tuple[np.ndarray, ...]:
-    """Return what a walk around a vertex reads."""
-    corners = topology.faces.reshape(-1)
-    return corners, topology.corner_edges, topology.half_edges, topology.edge_class
-
-
-# --- positions ------------------------------------------------------------------------------------
-
-
-def _limits(
-    points: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
-) -> Float[np.ndarray, "V K"]:
-    return in_threes(points, len(points), lambda three: _limits_of_three(three, topology, blocks))
-
-
-def _limits_of_three(
-    points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
-) -> Float[np.ndarray, "V 3"]:
-    count, sharp = topology.vertex_count, topology.sharpest
-    limits, valence = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: masks.sum_rings(
-            points, topology.edges, topology.edge_reach, begin, end, limits, valence
-        ),
-    )
-    valences = np.arange(int(valence.max(initial=0)) + 1)
-    weight = limit_ring_weight(valences) / np.maximum(valences, 1)
-    blocks.run(
-        count,
-        lambda begin, end: masks.blend_rings(points, valence, weight, begin, end, limits),
-    )
-    if sharp is None:
-        return limits
-    darts = np.flatnonzero(topology.sharp_count == DART)
-    if len(darts):
-        limits[darts] = _dart_limits(points, topology, darts, beta(valence[darts])[:, None])
-    curve = CURVE_CENTRE, CURVE_NEIGHBOUR
-    masks.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, limits)
-    return limits
-
-
-def _dart_limits(
     points: Float[np.ndarray, "V 3"],
     topology: Topology,
-    darts: Integer[np.ndarray, " D"],
-    beta_of_darts: Float[np.ndarray, "D 1"],
-) -> Float[np.ndarray, "D 3"]:
-    """Return the limits of the vertices on exactly one sharp edge."""
-    around, sums = find_sectors(topology), np.zeros((topology.vertex_count, WIDTH))
-    total = np.zeros(topology.vertex_count)
-    assert topology.sharpest is not None
-    # The sharp edge: 2 (β + an eighth of both spokes beside it); that eighth is in the tables.
-    sums[darts] = 2 * (points[topology.sharpest.neighbours[darts, 0]] - points[darts])
-    total[darts] = 2
-    rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
-    at, weights = _tables(dart_weights, rows < around.opened, around.size[rows])
-    read = around.first, around.size, at, weights, rows
-    kernels.sum_darts(points, *_walked(topology), *read, sums, total)
-    scale = beta_of_darts / (1 + beta_of_darts * total[darts, None])
-    return points[darts] + scale * sums[darts]
+    blocks: Blocks | None = None,
+    base: BaseScheme = LOOP,
+) -> LimitNormals:
+    """Return the normals of the limit surface at the limits of the vertices.
 
-
-def dart_weights(opened: int, k: int) -> Float[np.ndarray, " K"]:
-    """Return a dart's weights of q_0 … q_{k−1} in a sector, in units of β.
-
-    They solve 5 w_j = 8 + w_{j−1} + w_{j+1}, with 0 at both ends if the sector is open. In place of
-    w_0 stands the share that w_1 and w_{k−1} add to the sharp edge's weight.
+    Raises:
+        ParameterError: the scheme has no limit masks.
     """
-    if not opened:
-        return np.full(k, FAR_WEIGHT)
-    j = np.arange(k + 1)
-    weights = FAR_WEIGHT * (1 - (DECAY**j + DECAY ** (k - j)) / (1 + DECAY**k))
-    weights[0] = weights[1] / 2
-    return weights[:k]
+    return _masks(base).normals(points, topology, blocks or Blocks())
 
 
-def _tables(
-    make: Callable[[int, int], np.ndarray],
-    kind: Shaped[np.ndarray, " S"],
-    size: Integer[np.ndarray, " S"],
-) -> tuple[Integer[np.ndarray, " S"], Float[np.ndarray, " *M"]]:
-    """Return ``make(kind, size)`` for all pairs that occur, in a row, and where each one begins."""
-    keys, which = np.unique(4 * size.astype(np.int64) + kind, return_inverse=True)
-    tables = [make(int(key % 4), int(key // 4)) for key in keys]
-    starts = np.cumsum([0, *map(len, tables)])[:-1]
-    return starts[which.reshape(-1)], np.concatenate(tables)
-
-
-# --- tangents -------------------------------------------------------------------------------------
-
-
-def tangent_mask(kind: int, k: int) -> Float[np.ndarray, "K1 2"]:
-    """Return the weights of q_0 … q_k, less p, in both tangents of a sector of k faces.
-
-    All weights sum to 0 with the centre's, so p has none.
-    """
-    mask = np.zeros((k + 1, 2))
-    if kind == CLOSED:
-        angle = 2 * np.pi * np.arange(k) / k
-        mask[:k, 0] = np.cos(angle)
-        # Of two corners, those of a fold, sin(π) in floats would be a direction made of rounding.
-        mask[:k, 1] = np.sin(angle) if k != 2 else 0.0
-    elif kind == DART:
-        even, odd = dart_tangents(k)
-        mask[:k, 0], mask[:k, 1] = even[1:], odd
-    elif kind == CURVE:
-        mask[0, 0], mask[k, 0] = 1, -1
-        mask[1:k, 1] = np.sin(np.pi * np.arange(1, k) / k)
-        total = 1 / np.tan(np.pi / k / 2) if k > 1 else 0.0
-        rate = masks.EDGE_ENDPOINT + np.cos(np.pi / k) / 4
-        mask[[0, k], 1] = (np.sin(np.pi / k) - total) / (8 * rate - 2) if k > 1 else 1 / 2
-    else:
-        mask[0, 0], mask[k, 1] = 1, 1
-    return mask
-
-
-def dart_tangents(valence: int) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " K"]]:
-    """Return the even mask (centre first) and the odd one (neighbours alone), the crease at q_0."""
-    angle, even = 2 * np.pi * np.arange(valence) / valence, _even(valence)
-    odd = np.sin(angle) if valence > 2 else np.zeros(valence)
-    return even * np.sign(even[1:] @ np.cos(angle)), odd
-
-
-@lru_cache(maxsize=64)
-def _even(k: int) -> Float[np.ndarray, " N"]:
-    """Return the second even left eigenvector of a dart's matrix; finding it takes milliseconds."""
-    return _even_of_few(k) if k < MANY else _even_of_many(k)
-
-
-def _even_of_few(k: int) -> Float[np.ndarray, " N"]:
-    """Return that eigenvector for fewer than MANY spokes, from the matrix."""
-    weight = float(beta(np.array([k]))[0])
-    matrix = np.zeros((k + 1, k + 1))
-    matrix[0, 0], matrix[0, 1:] = 1 - k * weight, weight
-    matrix[1, :2] = masks.MIDPOINT
-    for j in range(1, k):
-        matrix[1 + j, 0] = matrix[1 + j, 1 + j] = masks.EDGE_ENDPOINT
-        for beside in (j - 1, j + 1):
-            matrix[1 + j, 1 + beside % k] += masks.EDGE_OPPOSITE
-    # Orthonormal coordinates of what reads alike both ways round.
-    fold = np.zeros((k // 2 + 2, k + 1))
-    fold[0, 0] = 1
-    for j in range(k):
-        fold[1 + min(j, k - j), 1 + j] = 1
-    fold /= np.linalg.norm(fold, axis=1, keepdims=True)
-    values, vectors = np.linalg.eig(fold @ matrix.T @ fold.T)
-    second = np.argsort(-np.real(values))[1]
-    return fold.T @ np.real(vectors[:, second])
-
-
-def _even_of_many(k: int) -> Float[np.ndarray, " N"]:
-    """Return that eigenvector for MANY spokes and more: the matrix may be too large.
-
-    With weight 1 of p, λ = 3/8 + cos(θ)/4 and t = k θ/2, columns 0 < j < k say
-    w_j = c (1 − cos(θ (j − k/2)) / cos t), c = 4 β / (cos θ − 1); that of q_0 says
-    (λ − 1/2) w_0 = β + w_1 / 4; and p's own, (λ − 1 + k β) = w_0 / 2 + 3/8 Σ w_j, is left to be
-    solved for t. Its second root lies between π and 3π/2, alone.
-    """
-    low, high = np.pi, 3 * np.pi / 2
-    while low < (middle := (low + high) / 2) < high:
-        _, missing = _even_at(middle, k)
-        low, high = (middle, high) if missing > 0 else (low, middle)
-    weights, _ = _even_at(low, k)
-    return weights / np.linalg.norm(weights)
-
-
-def _even_at(t: float, k: int) -> tuple[Float[np.ndarray, " N"], float]:
-    """Return the weights at a t, and by how much p's own column is missed."""
-    weight, theta = float(beta(np.array([k]))[0]), 2 * t / k
-    rate = masks.EDGE_ENDPOINT + np.cos(theta) / 4
-    c = -2 * weight / np.sin(theta / 2) ** 2
-    inner = c * (1 - np.cos(theta * (np.arange(1, k) - k / 2)) / np.cos(t))
-    at_crease = (weight + inner[0] / 4) / (rate - masks.MIDPOINT)
-    missing = rate - 1 + k * weight - at_crease / 2 - masks.EDGE_ENDPOINT * inner.sum()
-    return np.concatenate([[1.0, at_crease], inner]), float(missing)
+def _masks(base: BaseScheme) -> Limit:
+    if base.limit is None:
+        raise ParameterError("limit", True, expected=f"False: {base.name} has no limit masks")
+    return base.limit

@@ -28,8 +28,9 @@ class Mesh:
 
     Args:
         vertices: (V, 3) real numbers.
-        faces: (F, 3) triangles, (F, n) polygons of n corners, or a list of polygons of any degrees;
-            whole numbers.
+        faces: (F, 3) triangles, (F, n) polygons of n corners, a list of polygons of any degrees,
+            or a pair of arrays (corners, offsets): all corners in a row, and where those of each
+            face begin, with their number at the end; whole numbers.
 
     Attributes:
         vertices: (V, 3) float64.
@@ -53,7 +54,7 @@ class Mesh:
             raise MeshError(f"shape {given.shape}, expected (V, 3)", element="vertices")
         if given.dtype.kind not in "fiu":
             raise MeshError(f"type {given.dtype}, expected real numbers", element="vertices")
-        corners, offsets = _polygons(faces, len(given))
+        corners, offsets = as_polygons(faces, len(given))
         if len(corners) == 0:
             raise MeshError("no faces to refine", element="faces")
         points = np.array(given, dtype=np.float64, order="C")
@@ -85,8 +86,7 @@ class Mesh:
         return _kept, (self.vertices, self.corners, self._offsets, degree)
 
     def __repr__(self) -> str:
-        count = len(self.offsets) - 1 if self._faces is None else len(self._faces)
-        return f"Mesh(vertices={len(self.vertices)}, faces={count})"
+        return f"Mesh(vertices={len(self.vertices)}, faces={self.face_count})"
 
     @property
     def offsets(self) -> Integer[np.ndarray, " F1"]:
@@ -94,6 +94,11 @@ class Mesh:
         if self._offsets is not None:
             return self._offsets
         return np.arange(0, len(self.corners) + 1, int(self.faces.shape[1]))
+
+    @property
+    def face_count(self) -> int:
+        """Number of faces."""
+        return len(self.offsets) - 1 if self._faces is None else len(self._faces)
 
     @property
     def faces(self) -> Integer[np.ndarray, "F N"]:
@@ -123,10 +128,10 @@ class Mesh:
 
     @classmethod
     def of_refined(
-        cls, vertices: Float[np.ndarray, "V 3"], faces: Integer[np.ndarray, "F 3"]
+        cls, vertices: Float[np.ndarray, "V 3"], faces: Integer[np.ndarray, "F N"]
     ) -> Mesh:
         """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
-        return _kept(vertices, faces.reshape(-1), None, TRIANGLE)
+        return _kept(vertices, faces.reshape(-1), None, faces.shape[1])
 
 
 def _kept(
@@ -207,45 +212,37 @@ def check_is_mesh(given: object) -> None:
         raise ParameterError("mesh", type(given), expected=other)
 
 
-def check_faces(faces: np.ndarray, vertex_count: int) -> None:
-    """Check triangles of so many vertices; there may be none.
-
-    Raises:
-        MeshError: wrong shape or type, or an index out of range.
-    """
-    if faces.ndim != 2 or faces.shape[1] != TRIANGLE:
-        raise MeshError(f"shape {faces.shape}, expected (F, 3)", element="faces")
-    if len(faces) == 0:  # an empty list has no integers
-        return
-    if faces.dtype.kind not in "iu":
-        raise MeshError(f"type {faces.dtype}, expected integers", element="faces")
-    offsets = np.arange(0, faces.size + 1, TRIANGLE)
-    _check_indices(faces.reshape(-1), offsets, vertex_count)
-
-
 def repeated_vertex(faces: Integer[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
     """Return whether a triangle names a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
 
 
-def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return corners and offsets of faces of any degree. Raises MeshError."""
+def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners and offsets of faces as ``Mesh`` takes them; there may be none.
+
+    Raises:
+        MeshError: as ``Mesh``.
+    """
     several = isinstance(faces, list | tuple)
     rows: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
     degrees = [int(np.size(face)) for face in rows]
-    if len(set(degrees)) > 1:
+    arrays: list[np.ndarray] = [face for face in rows if isinstance(face, np.ndarray)]
+    if isinstance(faces, tuple) and [array.ndim for array in arrays] == [1, 1] == [1] * len(rows):
+        corners, offsets = arrays
+        _check_offsets(offsets, len(corners))
+    elif len(set(degrees)) > 1:
         corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(degrees)])
     else:
-        given = _array(faces, "faces")
+        given = _array(rows if several else faces, "faces")
         if given.size == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
         if given.ndim != 2:
             raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
         corners = given.reshape(-1)
         offsets = np.arange(0, corners.size + 1, int(given.shape[1]), dtype=np.int64)
-    if corners.dtype.kind not in "iu":
+    if len(corners) and corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
     few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
     if len(few):
@@ -257,8 +254,15 @@ def _polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(corners, dtype=np.int64), offsets.astype(np.int64)
 
 
+def _check_offsets(offsets: np.ndarray, count: int) -> None:
+    whole = offsets.dtype.kind in "iu" and len(offsets) > 0
+    if not whole or offsets[0] != 0 or offsets[-1] != count or (offsets[1:] < offsets[:-1]).any():
+        expected = f"whole numbers that rise from 0 to {count}, the number of corners"
+        raise MeshError(f"offsets {offsets.tolist()[:4]} …, expected {expected}", element="faces")
+
+
 def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) -> None:
-    if corners.min() >= 0 and corners.max() < vertex_count:
+    if len(corners) == 0 or (corners.min() >= 0 and corners.max() < vertex_count):
         return
     outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
     first: int = outside[0]

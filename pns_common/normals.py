@@ -8,7 +8,7 @@ from jaxtyping import Float, Integer
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
 from pns_common.parallel import Blocks
-from pns_common.topology import build_topology
+from pns_common.topology import Topology, build_topology
 
 NO_AREAS = np.zeros((0, 4))
 # A face that is one triangle.
@@ -27,6 +27,33 @@ def face_normals(
         lambda begin, end: measures.measure_faces(points, faces, begin, end, normals, NO_AREAS),
     )
     return normals
+
+
+def measure_faces(
+    points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks, *, areas: bool
+) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "A 4"]]:
+    """Return unit normals of faces of any degree, and if asked twice the area vectors and lengths.
+
+    A polygon's area vector is that of any fan of triangles over it (Newell); normals are 0 without
+    area.
+    """
+    count, mesh = topology.face_count, topology
+    normals, vectors = np.empty((count, 3)), np.empty((count if areas else 0, 4))
+    if mesh.triangles:
+        blocks.run(
+            count,
+            lambda begin, end: measures.measure_faces(
+                points, mesh.faces, begin, end, normals, vectors
+            ),
+        )
+    else:
+        blocks.run(
+            count,
+            lambda begin, end: measures.measure_polygons(
+                points, mesh.corners, mesh.offsets, begin, end, normals, vectors
+            ),
+        )
+    return normals, vectors
 
 
 def angle_weighted_normals(

@@ -212,8 +212,9 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     is 0 on planes and linear in scale, and 0 on curves, which have their own (curves.py).
     """
     rings, made = level.rings, np.empty(level.points.shape)
-    assert level.base.limit_weight is not None
-    weight = level.base.limit_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
+    assert level.base.limit is not None
+    assert level.base.limit.ring_weight is not None
+    weight = level.base.limit.ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
     read = rings.means, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
     level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
     sharp = level.topology.sharpest

@@ -15,7 +15,7 @@ class Progress:
     """Turns rows that loops have begun into faces made so far.
 
     Args:
-        faces: faces of the control mesh.
+        children: faces that the first level makes; each later one splits them in four.
         levels: number of levels.
         learned_levels: levels at which a learned rule acts.
         limit: whether the limit surface is computed.
@@ -25,13 +25,13 @@ class Progress:
 
     def __init__(
         self,
-        faces: int,
+        children: int,
         levels: int,
         learned_levels: int,
         limit: bool,
         tell: Callable[[int, int], None],
     ) -> None:
-        made = [faces * 4**level for level in range(1, levels + 1)]
+        made = [children * 4**level for level in range(levels)]
         learned = [depth < learned_levels for depth in range(levels)]
         self._costs = [n * (LEARNED_COST if is_ else 1) for n, is_ in zip(made, learned)]  # noqa: B905
         self._rows = [

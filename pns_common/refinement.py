@@ -23,6 +23,7 @@ from pns_common.operator import Additions, learned_level
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
 from pns_common.progress import Progress
+from pns_common.quads import QUAD
 from pns_common.reference_length import measure_reference_length
 from pns_common.report import (
     LevelReport,
@@ -32,8 +33,8 @@ from pns_common.report import (
     limit_distances,
     longest,
 )
-from pns_common.schemes import Scheme
-from pns_common.topology import Topology, split_faces
+from pns_common.schemes import NAMES, Scheme, named_scheme
+from pns_common.topology import TRIANGLE, Topology
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
 # No refinement takes less for a face that it makes.
@@ -56,8 +57,9 @@ class Step:
         """Measure and summarise the step."""
         mesh, blocks = self.level.topology, self.level.blocks.quiet()
         base_points = None if self.added is None else self.added.base_points
-        angles = child_angles(mesh, self.points, base_points, blocks)
-        return level_report(mesh, self.added, angles, crease_shift(self.level, self.points))
+        quads, shift = self.level.base.polygons, crease_shift(self.level, self.points)
+        angles = child_angles(mesh, self.points, base_points, blocks, quads)
+        return level_report(mesh, self.added, angles, shift, quads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +113,14 @@ class Refinement:
         return [step.level.topology for step in self.steps]
 
     def __repr__(self) -> str:
-        vertices, faces = len(self.mesh.vertices), len(self.mesh.faces)
+        vertices, faces = len(self.mesh.vertices), self.mesh.face_count
         name, levels = self.scheme.name, len(self.steps)
         return f"Refinement({name!r}, levels={levels}, vertices={vertices}, faces={faces})"
 
 
 def refine(
     mesh: Mesh,
-    scheme: Scheme,
+    scheme: Scheme | str,
     levels: SupportsIndex = DEFAULT_LEVELS,
     reference_length: float | str = "auto",
     *,
@@ -127,11 +129,15 @@ def refine(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
-    """Refine a mesh. Each level splits every face in four; nothing is renumbered.
+    """Refine a mesh. Nothing is renumbered.
+
+    Loop's scheme splits triangles in four; Catmull–Clark's splits faces of any degree into quads.
 
     Args:
         mesh: the control mesh.
-        scheme: ``loop()``, ``pns(model)`` or any other.
+        scheme: ``loop()``, ``catmull_clark()``, ``pns(model)``, or the name "loop",
+            "catmull-clark" or "pns", the default model. The default model refines triangles by
+            Loop's scheme; a mesh with other faces goes to its companion over Catmull–Clark.
         levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
@@ -153,20 +159,17 @@ def refine(
     """
     _announce_compiling()
     check_is_mesh(mesh)
-    if not isinstance(scheme, Scheme):  # pyright: ignore[reportUnnecessaryIsInstance]
-        expected = "a Scheme, as loop() or pns(load_model())"
-        raise ParameterError("scheme", type(scheme), expected=expected)
-    count = levels_that_fit(levels, len(mesh.faces))
+    scheme = scheme_for(mesh, scheme)
+    children = len(mesh.corners) if scheme.base.polygons else 4 * mesh.face_count
+    count = levels_that_fit(levels, children, QUAD if scheme.base.polygons else TRIANGLE)
     length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
     if not is_bool(limit):
         raise ParameterError("limit", limit, expected="True or False")
     kept = chosen_creases(creases, scheme.creases)
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
-    told = _progress(len(mesh.faces), count, learned if scheme.rule else 0, limit, progress)
+    told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
 
-    if not mesh.triangles:
-        raise MeshError("faces of other degrees, expected triangles", element="faces")
     topology = kept.applied(mesh.vertices, mesh.topology(blocks))
     points, steps = mesh.vertices, list[Step]()
     for depth in range(count):
@@ -176,11 +179,13 @@ def refine(
         points = steps[-1].points
         if told:
             told.level_ends()
-    faces, normals, shift = split_faces(topology, blocks, np.int64), None, 0.0
+    faces, normals, shift = scheme.base.faces(topology, blocks, np.int64), None, 0.0
     if limit:
         last = scheme.base.split(topology, blocks)
-        shift = limit_shift(points, last)
-        points, normals = limit_positions(points, last), limit_normals(points, last).vertices
+        surface = last, blocks, scheme.base
+        shift = limit_shift(points, *surface)
+        normals = limit_normals(points, *surface).vertices
+        points = limit_positions(points, *surface)
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
@@ -193,6 +198,28 @@ def refine(
         scheme=scheme,
         limit_shift=shift,
     )
+
+
+def scheme_for(mesh: Mesh, scheme: Scheme | str) -> Scheme:
+    """Return the scheme that refines a mesh: that of a name, or a companion for polygons.
+
+    Raises:
+        ParameterError: it is neither a scheme nor a name of one.
+        MeshError: the mesh has polygons, and the scheme refines triangles alone.
+    """
+    if isinstance(scheme, str):
+        scheme = named_scheme(scheme)
+    if not isinstance(scheme, Scheme):  # pyright: ignore[reportUnnecessaryIsInstance]
+        expected = f"a Scheme, as loop() or pns(load_model()), or one of {', '.join(NAMES)}"
+        raise ParameterError("scheme", type(scheme), expected=expected)
+    if mesh.triangles or scheme.base.polygons:
+        return scheme
+    if scheme.for_polygons is None:
+        reason = (
+            f"polygons, expected triangles for {scheme.base.name}; catmull-clark takes polygons"
+        )
+        raise MeshError(reason, element="faces")
+    return scheme.for_polygons()
 
 
 def control_level(
@@ -279,8 +306,13 @@ def _check_coordinates(points: Float[np.ndarray, "W 3"], blocks: Blocks) -> None
         raise MeshError(f"{reason}: the budget is too large", element="vertices")
 
 
-def levels_that_fit(given: SupportsIndex, faces: int) -> int:
+def levels_that_fit(given: SupportsIndex, children: int, degree: int) -> int:
     """Return the number of levels as int.
+
+    Args:
+        given: what was asked for.
+        children: how many faces the first level makes; each later one splits them in four.
+        degree: how many corners these have.
 
     Raises:
         ParameterError: it is no whole number from 1 to 16, or so many refined faces cannot fit
@@ -288,12 +320,12 @@ def levels_that_fit(given: SupportsIndex, faces: int) -> int:
     """
     if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
         raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
-    made, there = faces * 4**levels, memory_here()
+    made, there = children * 4 ** (levels - 1), memory_here()
     needed = made * LEAST_BYTES_PER_FACE
     if there is not None and needed > there:
         sizes = f"{needed / 2**30:,.1f} GiB or more, of the {there / 2**30:,.1f} here"
         raise ParameterError("levels", levels, expected=f"fewer: {made:,} faces take {sizes}")
-    if 3 * made > LARGEST_INDEX:
+    if degree * made > LARGEST_INDEX:
         raise ParameterError("levels", levels, expected=f"fewer: {made:,} faces cannot be numbered")
     return levels
 
@@ -304,7 +336,7 @@ def _reference_length(mesh: Mesh, given: float | str, *, measured: bool) -> floa
     if isinstance(given, str) and given == "auto":
         if not measured:
             return None
-        return measure_reference_length(mesh.vertices, mesh.faces.reshape(-1))
+        return measure_reference_length(mesh.vertices, mesh.corners)
     if not (is_number(given) and float(given) > 0):
         raise ParameterError("reference_length", given, expected='"auto" or a number > 0')
     return float(given)
@@ -319,7 +351,7 @@ def _threads(given: int | None) -> int:
 
 
 def _progress(
-    faces: int,
+    children: int,
     levels: int,
     learned_levels: int,
     limit: bool,
@@ -329,4 +361,4 @@ def _progress(
         return None
     if not callable(tell):
         raise ParameterError("progress", tell, expected="a function of two whole numbers, or None")
-    return Progress(faces, levels, learned_levels, limit, tell)
+    return Progress(children, levels, learned_levels, limit, tell)

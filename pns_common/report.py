@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
+from pns_common.kernels import quads as of_quads
 from pns_common.operator import Additions
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
@@ -126,29 +127,43 @@ def child_angles(
     points: Float[np.ndarray, "W 3"],
     base_points: Float[np.ndarray, "W 3"] | None,
     blocks: Blocks,
+    quads: bool,
 ) -> ChildAngles:
-    """Measure the children of a mesh's triangles.
+    """Measure the children of a mesh's faces.
 
     Args:
         parent: the mesh that was split.
         points: vertices of the split mesh.
         base_points: where the base scheme puts them; None where no child can be flipped.
         blocks: how work is shared.
+        quads: whether each corner became a quad; else each triangle four.
     """
-    normals = _child_normals(parent, points, blocks)
-    inside = blocks.run(
-        parent.face_count,
-        lambda begin, end: children.largest_chord_inside(normals, begin, end),
-    )
-    across = blocks.run(
-        len(parent.edges),
-        lambda begin, end: children.largest_chord_across(
-            normals, parent.half_edges, parent.edge_class, begin, end
-        ),
-    )
+    normals = _child_normals(parent, points, blocks, quads)
+    of_mesh = parent.half_edges, parent.edge_class
+    if quads:
+        corners = parent.offsets, parent.face_of_corner
+        inside = blocks.run(
+            parent.face_count,
+            lambda begin, end: of_quads.largest_chord_inside(normals, parent.offsets, begin, end),
+        )
+        across = blocks.run(
+            len(parent.edges),
+            lambda begin, end: of_quads.largest_chord_across(
+                normals, *corners, *of_mesh, begin, end
+            ),
+        )
+    else:
+        inside = blocks.run(
+            parent.face_count,
+            lambda begin, end: children.largest_chord_inside(normals, begin, end),
+        )
+        across = blocks.run(
+            len(parent.edges),
+            lambda begin, end: children.largest_chord_across(normals, *of_mesh, begin, end),
+        )
     flipped = 0
     if base_points is not None:
-        others = _child_normals(parent, base_points, blocks)
+        others = _child_normals(parent, base_points, blocks, quads)
         flipped = sum(
             blocks.run(
                 len(normals),
@@ -160,10 +175,22 @@ def child_angles(
 
 
 def _child_normals(
-    parent: Topology, points: Float[np.ndarray, "W 3"], blocks: Blocks
+    parent: Topology, points: Float[np.ndarray, "W 3"], blocks: Blocks, quads: bool
 ) -> Float[np.ndarray, "C 3"]:
+    count = parent.vertex_count
+    if quads:
+        normals = np.empty((len(parent.corners), 3))
+        of_faces = parent.corners, parent.offsets, parent.corner_edges
+        ends = count, count + len(parent.edges)
+        blocks.run(
+            parent.face_count,
+            lambda begin, end: of_quads.child_normals(
+                points, *of_faces, *ends, begin, end, normals
+            ),
+        )
+        return normals
     normals = np.empty((4 * parent.face_count, 3))
-    read = points, parent.faces, parent.face_edges, parent.vertex_count
+    read = points, parent.faces, parent.face_edges, count
     blocks.run(
         parent.face_count, lambda begin, end: children.child_normals(*read, begin, end, normals)
     )
@@ -171,7 +198,11 @@ def _child_normals(
 
 
 def level_report(
-    parent: Topology, added: Additions | None, angles: ChildAngles, crease_shift: float | None
+    parent: Topology,
+    added: Additions | None,
+    angles: ChildAngles,
+    crease_shift: float | None,
+    quads: bool,
 ) -> LevelReport:
     """Summarise the step that refined ``parent``; ``added`` is None for the base scheme."""
     count = parent.vertex_count
@@ -179,8 +210,8 @@ def level_report(
     ratio = none if added is None else _of(added.ratio[count:], parent.interior)
     gate = none if added is None else _of(added.gate[count:], parent.interior)
     report: LevelReport = {
-        "vertices": count + len(parent.edges),
-        "faces": 4 * parent.face_count,
+        "vertices": count + len(parent.edges) + (parent.face_count if quads else 0),
+        "faces": len(parent.corners) if quads else 4 * parent.face_count,
         "edges": edge_counts(parent.edge_class),
         "degenerate_frames": 0 if added is None else added.degenerate,
         "flipped_faces": angles.flipped,

@@ -67,7 +67,7 @@ class Topology:
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
-        plain: all faces are triangles, none names a vertex twice, no two have the same vertices.
+        plain: no face names a vertex twice, and no two triangles have the same vertices.
     """
 
     vertex_count: int
@@ -102,6 +102,10 @@ class Topology:
         """Edges (a, b), (b, c), (c, a) of each triangle; ValueError as for ``faces``."""
         self._need_triangles()
         return self.corner_edges.reshape(-1, TRIANGLE)
+
+    def face_of(self, corners: Integer[np.ndarray, "*N"]) -> Integer[np.ndarray, "*N"]:
+        """Return the faces of some corners."""
+        return corners // TRIANGLE if self.triangles else self.face_of_corner[corners]
 
     def _need_triangles(self) -> None:
         if not self.triangles:
@@ -294,7 +298,7 @@ def build_topology(
         half_edges,
         edge_class,
         NO_WEIGHTS,
-        plain and triangles and not repeating,
+        (plain or not triangles) and not repeating,
     )
 
 
@@ -310,18 +314,10 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         inherit: whether the halves of creases and soft edges inherit their sharpness.
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
-    creases, soft = parent.crease_edges, parent.soft
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
-        if not inherit:
-            return made
-        made = made.with_creases(made.rows_of(halves_of(parent, creases)))
-        if len(soft):
-            rows = np.flatnonzero(soft)
-            sharpness = np.zeros(len(made.edges))
-            sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(soft[rows], 2)
-            made = made.with_sharpness(sharpness)
-        return made
+        return inheriting(made, parent) if inherit else made
+    soft = parent.soft
     source = parent if inherit else parent.without_creases()
     face_count, edge_count = parent.face_count, len(parent.edges)
     halves = np.empty((edge_count, 2), dtype=np.uint32)
@@ -354,6 +350,17 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         child_soft,
         plain=True,
     )
+
+
+def inheriting(made: Topology, parent: Topology) -> Topology:
+    """Return the topology of a split in which the halves of edges have their sharpness."""
+    made = made.with_creases(made.rows_of(halves_of(parent, parent.crease_edges)))
+    if len(parent.soft):
+        rows = np.flatnonzero(parent.soft)
+        sharpness = np.zeros(len(made.edges))
+        sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(parent.soft[rows], 2)
+        made = made.with_sharpness(sharpness)
+    return made
 
 
 def split_faces(

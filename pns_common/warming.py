@@ -11,7 +11,7 @@ from pns_common.kernels import are_compiled
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
 from pns_common.refinement import refine
-from pns_common.schemes import loop, pns
+from pns_common.schemes import catmull_clark, loop, pns
 
 ANNOUNCEMENT = "Compiling kernels, once: some fifteen seconds"
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
@@ -49,6 +49,7 @@ def _stages() -> Iterator[Callable[[], object]]:
     yield lambda: refine(closed, pns(load_model("paper")), 1).report
     yield lambda: refine(sheet, loop(), 1, limit=True)
     yield lambda: refine(closed, loop(), 1, limit=True, creases=crease)
+    yield lambda: refine(Mesh(VERTICES, CLOSED[:3]), catmull_clark(), 2, creases=crease).report
 
 
 if __name__ == "__main__":

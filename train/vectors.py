@@ -17,6 +17,11 @@ def norm(v: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N"]:
     return np.sqrt(dot(v, v))
 
 
+def angle(u: Float[np.ndarray, "*N 3"], v: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N"]:
+    """Return angles between vectors, radians; 0 where one of them is 0."""
+    return np.arctan2(norm(np.cross(u, v)), dot(u, v))
+
+
 def unit(
     v: Float[np.ndarray, "N 3"], shortest: Float[np.ndarray, " N"] | float = 0.0
 ) -> Float[np.ndarray, "N 3"]:

@@ -129,7 +129,7 @@ def child_normals(points, faces, face_edges, vertex_count, begin, end, normals):
 
 
 @inlined
-def _squared_chord(normals, f, g):
+def squared_chord(normals, f, g):
     """Return the squared distance between two unit normals; 0 where one is undefined."""
     n, m = row(normals, f), row(normals, g)
     chord = difference(n, m)
@@ -157,7 +157,7 @@ def largest_chord_inside(normals, begin, end):
     largest = 0.0
     for f in range(max(begin, 0), end):
         for i in range(3):
-            largest = max(largest, _squared_chord(normals, 4 * f + 3, 4 * f + i))
+            largest = max(largest, squared_chord(normals, 4 * f + 3, 4 * f + i))
     return largest
 
 
@@ -168,8 +168,8 @@ def largest_chord_across(normals, half_edges, edge_class, begin, end):
     for e in range(max(begin, 0), end):
         if edge_class[e] == INTERIOR:
             there, back = half_edges[e, 0], half_edges[e, 1]
-            largest = max(largest, _squared_chord(normals, _starting(there), _following(back)))
-            largest = max(largest, _squared_chord(normals, _following(there), _starting(back)))
+            largest = max(largest, squared_chord(normals, _starting(there), _following(back)))
+            largest = max(largest, squared_chord(normals, _following(there), _starting(back)))
     return largest
 
 

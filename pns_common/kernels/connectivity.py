@@ -288,12 +288,12 @@ def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
 
 
 @inlined
-def _opened_before(half_edges, face):
-    """Count the edges that first appear in an earlier face; first half-edges ascend."""
+def opened_before(half_edges, corner):
+    """Count the edges that first appear before a corner; first half-edges ascend."""
     least, most = 0, half_edges.shape[0]
     while least < most:
         middle = (least + most) // 2
-        if half_edges[middle, 0] < 3 * face:
+        if half_edges[middle, 0] < corner:
             least = middle + 1
         else:
             most = middle
@@ -306,7 +306,7 @@ def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
 
     ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
     """
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
     for f in range(max(begin, 0), end):
         for i in range(3):
             before = i - 1 if i > 0 else 2
@@ -358,7 +358,7 @@ def split_edges(
 ):
     """Write the edges of the children of triangles begin … end − 1."""
     to = to_edges, to_half_edges, to_class
-    following = 3 * begin + 2 * _opened_before(half_edges, begin)
+    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
     for f in range(max(begin, 0), end):
         for i in range(3):
             before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0

@@ -8,7 +8,7 @@ q_j and q_{j+1}. In a closed sector q_k = q_0.
 from __future__ import annotations
 
 from pns_common.kernels import inlined, kernel
-from pns_common.kernels.connectivity import INTERIOR, next_corner, previous_corner
+from pns_common.kernels.connectivity import INTERIOR, following_corner, preceding_corner
 from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over, row
 
 # Tangents that span less than this, of the product of their lengths, span no plane.
@@ -18,7 +18,7 @@ CANCELLED = 1e-9
 
 
 @inlined
-def _opposed(corner_edges, half_edges, edge_class, h):
+def opposed(corner_edges, half_edges, edge_class, h):
     """Return the other half-edge of an interior edge; −1 at other edges."""
     e = corner_edges[h]
     if edge_class[e] != INTERIOR:
@@ -28,7 +28,9 @@ def _opposed(corner_edges, half_edges, edge_class, h):
 
 
 @kernel
-def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
+def label_sectors(
+    offsets, face_of_corner, corner_edges, half_edges, edge_class, of_corner, first, size
+):
     """Find the sectors, open ones first; return how many are open, and how many there are.
 
     Args:
@@ -41,13 +43,14 @@ def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
         for start in range(of_corner.shape[0]):
             if of_corner[start] >= 0:
                 continue
-            if not closed and _opposed(corner_edges, half_edges, edge_class, start) >= 0:
+            if not closed and opposed(corner_edges, half_edges, edge_class, start) >= 0:
                 continue
             h, corners = start, 0
             while h >= 0 and of_corner[h] < 0:
                 of_corner[h] = count
                 corners += 1
-                h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))
+                before = preceding_corner(h, offsets, face_of_corner)
+                h = opposed(corner_edges, half_edges, edge_class, before)
             first[count], size[count] = start, corners
             count += 1
         if not closed:
@@ -59,6 +62,8 @@ def label_sectors(corner_edges, half_edges, edge_class, of_corner, first, size):
 def sector_normals(
     points,
     corners,
+    offsets,
+    face_of_corner,
     corner_edges,
     half_edges,
     edge_class,
@@ -84,15 +89,15 @@ def sector_normals(
         p, h, before = corners[first[s]], first[s], first[s]
         u, v, area, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(size[s] + 1):
-            far = corners[next_corner(h)] if j < size[s] else corners[before]
+            far = corners[following_corner(h, offsets, face_of_corner) if j < size[s] else before]
             spoke = between(points, p, far)
-            u = _add(u, masks[at[s] + j, 0], spoke)
-            v = _add(v, masks[at[s] + j, 1], spoke)
-            area = _add(area, 1.0, cross(last, spoke))
+            u = add(u, masks[at[s] + j, 0], spoke)
+            v = add(v, masks[at[s] + j, 1], spoke)
+            area = add(area, 1.0, cross(last, spoke))
             last = spoke
             if j < size[s]:
-                before = previous_corner(h)
-                h = _opposed(corner_edges, half_edges, edge_class, before)
+                before = preceding_corner(h, offsets, face_of_corner)
+                h = opposed(corner_edges, half_edges, edge_class, before)
         normal = cross(u, v)
         if outwards[s] and dot(normal, area) < 0:
             normal = -normal[0], -normal[1], -normal[2]
@@ -104,7 +109,8 @@ def sector_normals(
 
 
 @inlined
-def _add(sums, weight, v):
+def add(sums, weight, v):
+    """Return sums + weight v."""
     return sums[0] + weight * v[0], sums[1] + weight * v[1], sums[2] + weight * v[2]
 
 
@@ -130,6 +136,8 @@ def mean_of_sectors(normals, vertices, to, lengths):
 def sum_darts(
     points,
     corners,
+    offsets,
+    face_of_corner,
     corner_edges,
     half_edges,
     edge_class,
@@ -152,8 +160,9 @@ def sum_darts(
     for i in range(rows.shape[0]):
         h, p = first[rows[i]], corners[first[rows[i]]]
         for j in range(size[rows[i]]):
-            weight, far = weights[at[i] + j], corners[next_corner(h)]
+            weight, far = weights[at[i] + j], corners[following_corner(h, offsets, face_of_corner)]
             total[p] += weight
             for k in range(3):
                 sums[p, k] += weight * (points[far, k] - points[p, k])
-            h = _opposed(corner_edges, half_edges, edge_class, previous_corner(h))
+            before = preceding_corner(h, offsets, face_of_corner)
+            h = opposed(corner_edges, half_edges, edge_class, before)

@@ -11,6 +11,7 @@ import math
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, skipped_block
 from pns_common.kernels.vectors import (
+    NO_AREA,
     between,
     cross,
     difference,
@@ -45,6 +46,31 @@ def measure_faces(points, faces, begin, end, normals, areas):
         normal, vector, length = normal_and_area(row(points, a), row(points, b), row(points, c))
         for k in range(3):
             normals[f, k] = normal[k]
+        if len(areas):
+            for k in range(3):
+                areas[f, k] = vector[k]
+            areas[f, AREA] = length
+
+
+@kernel
+def measure_polygons(points, corners, offsets, begin, end, normals, areas):
+    """Write what ``measure_faces`` does, of polygons: their area vectors are sums over fans."""
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        origin = row(points, corners[first])
+        vector, squares = (0.0, 0.0, 0.0), 0.0
+        before = difference(row(points, corners[first + 1]), origin)
+        squares += dot(before, before)
+        for h in range(first + 2, stop):
+            spoke = difference(row(points, corners[h]), origin)
+            part = cross(before, spoke)
+            vector = vector[0] + part[0], vector[1] + part[1], vector[2] + part[2]
+            squares += dot(spoke, spoke)
+            before = spoke
+        length, shortest = norm(vector), NO_AREA * squares
+        known = dot(vector, vector) > shortest * shortest
+        for k in range(3):
+            normals[f, k] = vector[k] / length if known else 0.0
         if len(areas):
             for k in range(3):
                 areas[f, k] = vector[k]

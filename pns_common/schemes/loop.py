@@ -1,8 +1,8 @@
 """Loop subdivision of triangle meshes (Loop 1987), with sharp and soft creases.
 
 The whole scheme: where the new vertices of one level go (``place``), how the faces split
-(``split``), and where a vertex ends when the rules are applied for ever (``limit_weights``; the
-limit surface itself is in ``pns_common.limit``).
+(``split``), and where a vertex ends when the rules are applied for ever (``limit``, in
+``schemes.loop_limit``).
 
     edge vertex          3/8 (a + b) + 1/8 (c + d)                       equation 2
     vertex vertex        (1 − k β_k) p + β_k Σ neighbours                equation 3
@@ -18,35 +18,19 @@ sharpness w in between blend the rules; see ``kernels.loop.at_sharpness``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Float
 
-from pns_common.base_scheme import BaseScheme
+from pns_common.base_scheme import WIDTH, BaseScheme, Limit, in_threes
 from pns_common.kernels import loop as kernels
 from pns_common.parallel import Blocks
+from pns_common.schemes.loop_limit import limit_normals, limit_positions
+from pns_common.schemes.loop_weights import beta, limit_ring_weight
 from pns_common.topology import Topology, split_triangles
 
 KEPT = 64
-WIDTH = 3
-
-
-def beta(valence: Integer[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """Return β_k, the weight of one neighbour in Loop's own cosine formula; 0 for valence 0."""
-    k = np.maximum(valence, 1)
-    weight = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / k) / 4) ** 2) / k
-    return np.where(valence > 0, weight, 0.0)
-
-
-def limit_ring_weight(valence: Integer[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """Return w_k = 1 / (1 + 3 / (8 k β_k)), the ring's weight in the limit mask; 0 for k = 0.
-
-    The limit of a smooth vertex is (1 − w_k) p + w_k (mean of its neighbours).
-    """
-    ring = valence * beta(valence)
-    return ring / (ring + 3 / 8)
 
 
 def place(
@@ -55,24 +39,6 @@ def place(
     """Apply Loop's masks to any columns: rows of old vertices first, then of edge vertices."""
     rows = topology.vertex_count + len(topology.edges)
     return in_threes(values, rows, lambda three: _place_three(three, topology, blocks))
-
-
-def in_threes(
-    values: Float[np.ndarray, "V K"],
-    rows: int,
-    masks: Callable[[Float[np.ndarray, "V 3"]], Float[np.ndarray, "R 3"]],
-) -> Float[np.ndarray, "R K"]:
-    """Apply masks, which take three columns and return so many rows, to any number of columns."""
-    width = values.shape[1]
-    if width == WIDTH:
-        return masks(np.ascontiguousarray(values, dtype=np.float64))
-    placed = np.empty((rows, width))
-    for start in range(0, width, WIDTH):
-        given = values[:, start : start + WIDTH]
-        three = np.zeros((len(values), WIDTH))
-        three[:, : given.shape[1]] = given
-        placed[:, start : start + WIDTH] = masks(three)[:, : given.shape[1]]
-    return placed
 
 
 def _place_three(
@@ -114,4 +80,5 @@ def _kept_betas() -> Float[np.ndarray, " K"]:
     return beta(np.arange(KEPT))
 
 
-LOOP = BaseScheme("loop", place, split_triangles, limit_ring_weight)
+LIMIT = Limit(limit_positions, limit_normals, limit_ring_weight)
+LOOP = BaseScheme("loop", place, split_triangles, limit=LIMIT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -15,10 +16,12 @@ from pns_common.features import FEATURE_COUNT
 from pns_common.model.session import Model
 from pns_common.operator import Rule
 from pns_common.parameters import is_number
+from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
 
 PAPER_FORMAT, LEARNED_ONCE = 1, 4
-BASES = {LOOP.name: LOOP}
+BASES = {base.name: base for base in (LOOP, CATMULL_CLARK)}
+NAMES = (LOOP.name, CATMULL_CLARK.name)
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Scheme:
         rule: what is added at learned levels; None: nothing.
         learned_levels: at so many levels the rule acts, then the base scheme alone. None: at all.
         creases: the edges that ``creases="auto"`` keeps sharp.
+        for_polygons: makes the scheme that takes over on meshes with other faces than triangles,
+            where the base scheme has none for them; None: no scheme.
         budget, model, model_hash: for reports; None without a model.
     """
 
@@ -39,6 +44,7 @@ class Scheme:
     rule: Rule | None = field(default=None, repr=False)
     learned_levels: int | None = 0
     creases: Creases = field(default=NO_CREASES, repr=False)
+    for_polygons: Callable[[], Scheme] | None = field(default=None, repr=False)
     budget: float | None = None
     model: str | None = None
     model_hash: str | None = field(default=None, repr=False)
@@ -53,6 +59,22 @@ class Scheme:
 def loop() -> Scheme:
     """Return the scheme of Loop subdivision (Loop 1987)."""
     return Scheme("loop")
+
+
+def catmull_clark() -> Scheme:
+    """Return the scheme of Catmull–Clark subdivision (Catmull and Clark 1978)."""
+    return Scheme("catmull-clark", CATMULL_CLARK)
+
+
+def named_scheme(name: str) -> Scheme:
+    """Return a scheme by its name: a base scheme's.
+
+    Raises:
+        ParameterError: there is no such scheme.
+    """
+    if name not in BASES:
+        raise ParameterError("scheme", name, expected=f"one of {', '.join(NAMES)}")
+    return Scheme(name, BASES[name])
 
 
 def pns(model: Model, budget: float | None = None) -> Scheme:
@@ -84,8 +106,8 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     )
     if card.format == PAPER_FORMAT:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
-    if card.base not in BASES:
-        raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
+    if card.base not in BASES or card.base != LOOP.name:
+        raise ModelError(model.name, expected=f"a base of {[LOOP.name]}", found=repr(card.base))
     learned = replace(
         rule,
         vertex_network=partial(_vertices_at_unit_budget, model),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, refine
-from pns_common.schemes.loop import beta as loop_beta
+from pns_common.schemes.loop_weights import beta as loop_beta
 from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import (
     TETRAHEDRON,

@@ -8,7 +8,7 @@ import torch
 import trimesh
 from scipy.spatial import cKDTree
 
-from pns_common import Mesh, MeshError
+from pns_common import Mesh
 from tests.support.shared import published
 from train.connectivity import connect
 from train.data.batch import disjoint_union
@@ -27,7 +27,7 @@ from train.data.parts import (
 )
 from train.data.plane_meshes import regular_grid, scattered, turned_grid
 from train.data.primitives import PRIMITIVES, TRIANGULATED_QUADS, cylinder, icosphere, l_block
-from train.data.simplifiers import SIMPLIFIERS, clustered, fast_quadric, simplified
+from train.data.simplifiers import SIMPLIFIERS, fast_quadric, simplified
 from train.data.stream import (
     FAMILIES,
     SHARES,
@@ -291,15 +291,6 @@ def test_is_left_out_where_the_target_is_missed_or_little_hangs_together():
     count = len(SPHERE.vertices)
     parts = Mesh(np.concatenate(many), np.concatenate([SPHERE.faces + count * k for k in range(3)]))
     assert simplified(parts, fast_quadric, 600) is None
-
-
-def test_clustering_that_leaves_nothing_is_left_out():
-    """Two specks far apart: whatever the grid, each of them lies in two cells at the most."""
-    speck = 1e-6 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    specks = Mesh(np.concatenate([speck, [1, 0, 0] - speck]), np.arange(6).reshape(2, 3))
-    with pytest.raises(MeshError, match="leaves nothing"):
-        clustered(specks, 5)
-    assert simplified(specks, clustered, 5) is None
 
 
 COUNT = 60

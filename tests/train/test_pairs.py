@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from pns_common import Mesh, loop
+from pns_common import Mesh
 from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
 from train.data.pairs import references as subject
-from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair, turned
+from train.data.pairs.machined import machined_pairs
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.references import (
     WAYS,
@@ -33,21 +33,20 @@ from train.data.pairs.swept import random_profile, swept_pair
 from train.data.primitives import icosphere
 from train.data.simplifiers import SIMPLIFIERS
 from train.metrics.shape import volume
-from train.refining import refine
 from train.vectors import face_normals
 
 KINDS = [
     solid_pairs,
+    machined_pairs,
     grid_pair,
     sphere_pair,
     faceted_pair,
     patch_pair,
-    authored_pair,
     lathe_pair,
     swept_pair,
 ]
 
-CLOSED = [solid_pairs, sphere_pair, faceted_pair, authored_pair, lathe_pair]
+CLOSED = [solid_pairs, sphere_pair, faceted_pair, machined_pairs, lathe_pair]
 
 
 @cache
@@ -55,8 +54,8 @@ def drawn(kind):
     """Three pairs of a kind."""
     rng, pairs = np.random.default_rng(3), []
     while len(pairs) < 3:
-        if kind is solid_pairs:
-            pairs += list(solid_pairs(rng))
+        if kind in (solid_pairs, machined_pairs):
+            pairs += list(kind(rng))
         else:
             pair = kind(rng)
             pairs += [] if pair is None else [pair]
@@ -82,26 +81,11 @@ def test_coarse_faces_look_the_way_the_surface_does(kind):
 
 
 @pytest.mark.parametrize(
-    "kind", [solid_pairs, sphere_pair, faceted_pair, authored_pair, lathe_pair]
+    "kind", [solid_pairs, sphere_pair, faceted_pair, machined_pairs, lathe_pair]
 )
 def test_solids_are_closed(kind):
     for pair in drawn(kind):
         assert connect(pair.coarse.faces, len(pair.coarse.vertices)).paired.all()
-
-
-def test_the_surface_of_authored_meshes_is_loops():
-    for pair in drawn(authored_pair):
-        expected = refine(pair.coarse, loop(), 5).mesh.vertices
-        distance, _ = cKDTree(expected).query(pair.surface.points)
-        assert distance.max() < 0.03 * np.ptp(expected)
-        assert distance[: len(pair.coarse.vertices)].max() < 2e-3 * np.ptp(expected)
-
-
-def test_authored_meshes_are_quads_cut_in_two():
-    """Faces 2 i and 2 i + 1 share an edge, each face with one other."""
-    for pair in drawn(authored_pair):
-        one, other = pair.coarse.faces[::2], pair.coarse.faces[1::2]
-        np.testing.assert_array_equal(one[:, [0, 2]], other[:, :2])
 
 
 def test_a_turned_outline_is_the_prism_or_cone_that_it_draws():

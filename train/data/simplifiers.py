@@ -1,13 +1,20 @@
-"""Several ways to simplify a dense mesh: coarse meshes in practice come from any of them."""
+"""Six kinds of simplifiers: coarse meshes in practice come from any of them.
 
+meshoptimizer has no wheel on PyPI: MeshLab's quadric that keeps vertices where they are stands for
+its kind.
+"""
+
+import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import fast_simplification
-import igl
 import numpy as np
-from jaxtyping import Int
+import pyacvd
+import pymeshlab
+import pyvista
 from numpy.typing import ArrayLike
+from pyvista.core.errors import PyVistaDeprecationWarning
 
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import largest_part
@@ -18,11 +25,17 @@ AGGRESSIVENESS = 5.0
 # Share of the simplification that its largest part has to hold.
 LEAST_KEPT = 0.8
 
-# Cells of the grid along the longest side of what is clustered, at most.
-MOST_CELLS = 512
-
 # A result is used where its faces are within this factor of the target.
 CLOSENESS = 1.6
+
+# Vertices of the dense mesh over those of its clusters, at least.
+CLUSTERED = 8
+
+# Target length over that of as many equilateral triangles, at first.
+EVEN = 1.15
+
+# Of isotropic remeshing, each time with a length corrected by the last result's faces.
+TRIES, ITERATIONS = 2, 5
 
 Simplifier = Callable[[Mesh, int], Mesh]
 
@@ -35,43 +48,59 @@ def fast_quadric(mesh: Mesh, faces: int, aggressiveness: float = AGGRESSIVENESS)
     return _mesh(vertices, triangles)
 
 
-def quadric(mesh: Mesh, faces: int) -> Mesh:
-    """Collapse edges by quadrics, the cheapest first (Garland and Heckbert 1997; libigl)."""
-    vertices, triangles, *_ = igl.qslim(mesh.vertices, mesh.faces, faces)
-    return _mesh(vertices, triangles)
+def meshlab_quadric(mesh: Mesh, faces: int) -> Mesh:
+    """Collapse edges by quadrics, the cheapest first (Garland and Heckbert 1997; MeshLab)."""
+    return _by_meshlab(mesh, _decimated, faces, planarquadric=True)
 
 
-def shortest_edges(mesh: Mesh, faces: int) -> Mesh:
-    """Collapse the shortest edge to its midpoint: even triangles, whatever the shape (libigl)."""
-    vertices, triangles, *_ = igl.decimate(mesh.vertices, mesh.faces, faces)
-    return _mesh(vertices, triangles)
+def meshlab_vertices(mesh: Mesh, faces: int) -> Mesh:
+    """Collapse edges by quadrics onto vertices that are there already (MeshLab)."""
+    return _by_meshlab(mesh, _decimated, faces, optimalplacement=False)
 
 
-def clustered(mesh: Mesh, faces: int) -> Mesh:
-    """Merge the vertices in one cell of a grid at their mean (Rossignac and Borrel 1993).
+def vtk_quadric(mesh: Mesh, faces: int) -> Mesh:
+    """Collapse edges by quadrics with VTK's own placement (vtkQuadricDecimation)."""
+    done = pyvista.make_tri_mesh(mesh.vertices, mesh.faces).decimate(1 - faces / len(mesh.faces))
+    return _mesh(done.points, done.regular_faces)
 
-    The grid's fineness is found by bisection.
-    """
-    corner, extent = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max())
-    low, high, best, least = 2, MOST_CELLS, None, np.inf
-    while low <= high:
-        cells = (low + high) // 2
-        merged = _merged(mesh, np.floor((mesh.vertices - corner) / extent * cells).astype(np.int64))
-        count = 0 if merged is None else len(merged.faces)
-        if merged is not None and abs(count - faces) < least:
-            best, least = merged, abs(count - faces)
-        low, high = (cells + 1, high) if count < faces else (low, cells - 1)
-    if best is None:
-        raise MeshError("clustering leaves nothing", element="mesh")
-    return best
+
+def centroidal(mesh: Mesh, faces: int) -> Mesh:
+    """Cluster vertices by area into Voronoi cells and join their middles (pyacvd)."""
+    count, splits = faces // 2 + 2, 0
+    while len(mesh.vertices) * 4**splits < CLUSTERED * count:
+        splits += 1
+    with warnings.catch_warnings():
+        # pyacvd reads PyVista's arrays by their old names.
+        warnings.simplefilter("ignore", PyVistaDeprecationWarning)
+        clusters = pyacvd.Clustering(pyvista.make_tri_mesh(mesh.vertices, mesh.faces))
+        if splits:
+            clusters.subdivide(splits)
+        clusters.cluster(count)
+        done = clusters.create_mesh()
+    return _mesh(done.points, done.regular_faces)
+
+
+def isotropic(mesh: Mesh, faces: int) -> Mesh:
+    """Remesh to one edge length (Botsch and Kobbelt 2004; MeshLab)."""
+    corners = mesh.vertices[mesh.faces]
+    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = float(np.linalg.norm(twice, axis=1).sum()) / 2
+    length = EVEN * np.sqrt(4 / np.sqrt(3) * area / faces)
+
+    for _ in range(TRIES):
+        remeshed = _by_meshlab(mesh, _remeshed, length)
+        length *= np.sqrt(len(remeshed.faces) / faces)
+    return remeshed
 
 
 SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
     {
         "fast-quadric": fast_quadric,
-        "quadric": quadric,
-        "shortest-edges": shortest_edges,
-        "clustered": clustered,
+        "MeshLab": meshlab_quadric,
+        "MeshLab, own vertices": meshlab_vertices,
+        "VTK": vtk_quadric,
+        "pyacvd": centroidal,
+        "isotropic": isotropic,
     }
 )
 
@@ -91,21 +120,24 @@ def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
     return part if near and kept else None
 
 
-def _merged(mesh: Mesh, cell: Int[np.ndarray, "V 3"]) -> Mesh | None:
-    # Cells in the order of their coordinates, 0 … MOST_CELLS.
-    _, number = np.unique(cell @ (MOST_CELLS + 1) ** np.arange(2, -1, -1), return_inverse=True)
-    members = np.bincount(number)
-    sums = [np.bincount(number, column) for column in mesh.vertices.T]
-    faces = number[mesh.faces]
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    # Two sheets that fall together, whichever way they face, are left out both.
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+def _decimated(meshes: pymeshlab.MeshSet, faces: float, **options: bool) -> None:
+    meshes.meshing_decimation_quadric_edge_collapse(
+        targetfacenum=int(faces), preservenormal=True, preserveboundary=True, **options
     )
-    single = np.sort(first[count == 1])
-    if len(single) == 0:
-        return None
-    return _mesh(np.stack(sums, axis=1) / members[:, None], faces[single])
+
+
+def _remeshed(meshes: pymeshlab.MeshSet, length: float) -> None:
+    meshes.meshing_isotropic_explicit_remeshing(
+        targetlen=pymeshlab.PureValue(length), iterations=ITERATIONS
+    )
+
+
+def _by_meshlab(mesh: Mesh, run: Callable[..., None], size: float, **options: bool) -> Mesh:
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces.astype(np.int32)))
+    run(meshes, size, **options)
+    done = meshes.current_mesh()
+    return _mesh(done.vertex_matrix(), done.face_matrix())
 
 
 def _mesh(vertices: ArrayLike, faces: ArrayLike) -> Mesh:

@@ -16,7 +16,7 @@ import pytest
 import trimesh
 
 from pns_common.model.file import DEFAULT_MODEL, bundled_models, load_model
-from pns_common.schemes.loop import limit_ring_weight
+from pns_common.schemes.loop_weights import limit_ring_weight
 from service import cli
 from service.__main__ import main
 from service.gltf.read.container import read_glb, write_glb

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold, largest_part
-from train.data.pairs.references import Pair, Reference, coarsened
+from train.data.pairs.references import Pair, Reference, coarsened, sharp_edges
 
 # Of the split polyhedron that is then simplified.
 FEWEST_FACES, MOST_FACES = 1500, 8000
@@ -23,6 +23,9 @@ BLOCKS = 0.6
 
 # How often a convex one is a box, or a prism; else the hull of random points.
 BOXES, PRISMS = 0.2, 0.4
+
+# How often it is left as it is, with as few faces as modellers draw.
+AS_DRAWN = 0.25
 
 # Cells along each side of a block's grid.
 CELLS = 5
@@ -37,6 +40,9 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     if made is None:
         return None
     points, faces = made
+    sharp = sharp_edges(Mesh(points, faces))
+    if rng.random() < AS_DRAWN:
+        return Pair("faceted", Mesh(points, faces), sampled(points, faces, rng), sharp)
     dense, triangles = points, faces
     while len(triangles) < FEWEST_FACES:
         level = connect(triangles, len(dense))
@@ -50,7 +56,7 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     coarse = coarsened(dense + noise, triangles, min(count, len(triangles) // 2), rng)
     if coarse is None:
         return None
-    return Pair("faceted", coarse, sampled(points, faces, rng))
+    return Pair("faceted", coarse, sampled(points, faces, rng), sharp)
 
 
 def block(
@@ -95,11 +101,11 @@ def _corners(rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return signs * size
     if kind < BOXES + PRISMS:
-        count, taper = int(rng.integers(3, 13)), rng.uniform(0.3, 1.0)
+        count, taper = int(rng.integers(3, 8)), rng.uniform(0.3, 1.0)
         angle = 2 * np.pi * np.arange(count) / count
         ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
         return np.concatenate([ring - [0, 0, 1], ring * [taper, taper, 1] + [0, 0, 1]]) * size
-    return rng.normal(size=(int(rng.integers(6, 25)), 3)) * size
+    return rng.normal(size=(int(rng.integers(6, 16)), 3)) * size
 
 
 def _hull(

@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, control meshes that were made for Loop, parts of a lathe, and swept profiles.
+solids of plane faces, turned and machined parts, and swept profiles.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -10,25 +10,28 @@ from types import MappingProxyType
 import numpy as np
 
 from pns_common.reference_length import measure_reference_length
-from train.data.pairs.authored import authored_pair
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair
+from train.data.pairs.machined import machined_pairs
 from train.data.pairs.references import Pair, moved, patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
 from train.data.pairs.swept import swept_pair
 
-# How often each draws a pair, in the order that a seed means; the rest are solids.
+# How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.14,
-        grid_pair: 0.12,
+        patch_pair: 0.08,
+        grid_pair: 0.10,
         sphere_pair: 0.05,
-        faceted_pair: 0.14,
-        authored_pair: 0.08,
-        lathe_pair: 0.09,
-        swept_pair: 0.10,
+        faceted_pair: 0.08,
+        lathe_pair: 0.14,
+        swept_pair: 0.06,
     }
+)
+# Makers of several pairs of one shape, which are drawn one by one.
+SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
+    {machined_pairs: 0.24, solid_pairs: 0.25}
 )
 
 MOST_FACES = 2500
@@ -37,15 +40,17 @@ MOST_FACES = 2500
 def pair_stream(seed: int) -> Iterator[Pair]:
     """Yield all pairs of a seed, without end: centred, with reference length R = 1."""
     rng = np.random.default_rng(seed)
-    waiting: list[Pair] = []
-    makers, ends = list(SHARES), np.cumsum(list(SHARES.values()))
+    singles, several = list(SHARES), list(SHARED)
+    waiting: list[list[Pair]] = [[] for _ in several]
+    ends = np.cumsum([*SHARES.values(), *SHARED.values()])
     while True:
         kind = int(np.searchsorted(ends, rng.random()))
-        if kind < len(makers):
-            pair = makers[kind](rng)
+        if kind < len(singles):
+            pair = singles[kind](rng)
         else:
-            waiting = waiting or list(solid_pairs(rng))
-            pair = waiting.pop() if waiting else None
+            number = kind - len(singles)
+            waiting[number] = waiting[number] or list(several[number](rng))
+            pair = waiting[number].pop() if waiting[number] else None
         if pair is not None and len(pair.coarse.faces) <= MOST_FACES:
             scale = 1 / measure_reference_length(
                 pair.coarse.vertices, pair.coarse.faces.reshape(-1)

@@ -6,18 +6,23 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, MeshError, loop
+from train.connectivity import connect
 from train.data.dense_meshes import is_manifold
 from train.data.primitives import icosphere
 from train.data.simplifiers import SIMPLIFIERS, fast_quadric
 from train.data.stream import random_instance
 from train.refining import refine
 from train.surfaces.implicit import unit_normal
+from train.vectors import angle, face_normals
 
 # The kind of control meshes that were made for Loop's surface.
 AUTHORED = "authored"
 
 # The kind of few-faced parts that are to be no sharper than quasi-interpolation leaves them.
 LATHE = "lathe"
+
+# The kind of exact parts with sharp edges.
+MACHINED = "machined"
 
 # The kind of parts of machined surfaces: smooth, most of it bent one way alone.
 SWEPT = "swept"
@@ -31,13 +36,43 @@ class Reference:
     normals: Float[np.ndarray, "P 3"]
 
 
+# Ends of pieces of sharp edges.
+Segments = Float[np.ndarray, "S 2 3"]
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Pair:
-    """A coarse mesh and its surface; `kind` says where it comes from."""
+    """A coarse mesh and its surface.
+
+    Attributes:
+        kind: where it comes from.
+        sharp: the surface's own sharp edges; None where they are not known.
+    """
 
     kind: str
     coarse: Mesh
     surface: Reference
+    sharp: Segments | None = None
+
+
+# An edge of a surface that turns by more is sharp, radians.
+LEAST_SHARP = np.radians(15)
+
+# A surface without sharp edges.
+SMOOTH: Segments = np.zeros((0, 2, 3))
+
+
+def turns(mesh: Mesh, beside: Int[np.ndarray, "E 2"]) -> Float[np.ndarray, " E"]:
+    """Return the angles between pairs of faces, radians."""
+    normals = face_normals(mesh.vertices, mesh.faces)
+    return angle(normals[beside[:, 0]], normals[beside[:, 1]])
+
+
+def sharp_edges(mesh: Mesh, least: float = LEAST_SHARP) -> Segments:
+    """Return the interior edges of a mesh that turn by more than an angle, radians."""
+    level = connect(mesh.faces, len(mesh.vertices))
+    sharp = level.paired.numpy() & (turns(mesh, level.half_edges.numpy() // 3) > least)
+    return mesh.vertices[level.edges.numpy()[sharp]]
 
 
 def moved(pair: Pair, linear: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, " 3"]) -> Pair:
@@ -47,6 +82,7 @@ def moved(pair: Pair, linear: Float[np.ndarray, "3 3"], shift: Float[np.ndarray,
         pair.kind,
         Mesh(pair.coarse.vertices @ linear + shift, pair.coarse.faces),
         Reference(pair.surface.points @ linear + shift, pair.surface.normals @ turn),
+        None if pair.sharp is None else pair.sharp @ linear + shift,
     )
 
 
@@ -77,7 +113,7 @@ def sphere_pair(rng: np.random.Generator) -> Pair | None:
         return None
     normals = dense.vertices / axes
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Pair("sphere", coarse, Reference(dense.vertices * axes, normals))
+    return Pair("sphere", coarse, Reference(dense.vertices * axes, normals), SMOOTH)
 
 
 LEVELS, PROJECTIONS = 3, 4
@@ -91,14 +127,19 @@ def patch_pair(rng: np.random.Generator) -> Pair:
     for _ in range(PROJECTIONS):
         slope = surface.gradient(points)
         points = points - (surface.value(points) / (slope**2).sum(axis=1))[:, None] * slope
-    return Pair("patch", instance.mesh, Reference(points, unit_normal(surface, points)))
+    reference = Reference(points, unit_normal(surface, points))
+    return Pair("patch", instance.mesh, reference, SMOOTH)
 
 
 # How often each of `train.data.simplifiers`.
-#
-# The cheapest collapses first leave faces that are longer and thinner, along what bends one way
-# only, than sweeps with a threshold do.
-WAYS = {"fast-quadric": 0.5, "quadric": 0.3, "shortest-edges": 0.12, "clustered": 0.08}
+WAYS = {
+    "fast-quadric": 0.35,
+    "MeshLab": 0.25,
+    "MeshLab, own vertices": 0.1,
+    "VTK": 0.1,
+    "pyacvd": 0.1,
+    "isotropic": 0.1,
+}
 
 # How fast the sweeps' threshold may rise.
 AGGRESSIVENESS = (3.0, 5.0, 7.0)

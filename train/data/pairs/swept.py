@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from pns_common import Mesh
 from train.data.pairs.grid import Parametrised, cut_quads, random_cut, vertex_normals
-from train.data.pairs.references import SWEPT, Pair, Reference, coarsened
+from train.data.pairs.references import SMOOTH, SWEPT, Pair, Reference, coarsened
 from train.surfaces.solids import random_rotation
 
 # Pieces of a profile, from and below; how often one is straight, but for one that never is.
@@ -105,7 +105,7 @@ def swept_pair(rng: np.random.Generator) -> Pair | None:
     if coarse is None:
         return None
     surface = Reference(fine.vertices @ turn, vertex_normals(fine) @ turn)
-    return Pair(SWEPT, Mesh(coarse.vertices @ turn, coarse.faces), surface)
+    return Pair(SWEPT, Mesh(coarse.vertices @ turn, coarse.faces), surface, SMOOTH)
 
 
 def _random_sweep(profile: Profile, rng: np.random.Generator) -> tuple[Parametrised, bool]:

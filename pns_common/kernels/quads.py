@@ -1,0 +1,197 @@
+"""The split of polygons into quads, and its edges by arithmetic.
+
+The quad of corner h of face f is made of four vertices: its own, that of the edge that leaves it,
+the face's, and that of the edge that enters it. A parent edge has two halves. Each corner has an
+inner edge, from the vertex of the edge that leaves it to the face's. Over the quads of a face of n
+corners they appear in this order, halves only in the first face that they are on:
+
+    leaving₀ inner₀ innerₙ₋₁ entering₀    leaving₁ inner₁ entering₁  …    leavingₙ₋₁ enteringₙ₋₁
+
+This holds where no face names a vertex twice.
+"""
+
+from __future__ import annotations
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.children import squared_chord
+from pns_common.kernels.connectivity import INTERIOR, following_corner, opened_before
+from pns_common.kernels.vectors import NO_AREA, cross, difference, dot, norm, over, row
+
+QUAD = 4
+
+
+@kernel
+def split_faces(corners, offsets, corner_edges, vertex_count, face_vertex, begin, end, to):
+    """Write the quads of the corners of faces begin … end − 1; ``face_vertex`` is face 0's."""
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        for h in range(first, stop):
+            to[h, 0], to[h, 1] = corners[h], vertex_count + corner_edges[h]
+            to[h, 2] = face_vertex + f
+            to[h, 3] = vertex_count + corner_edges[h - 1 if h > first else stop - 1]
+
+
+@kernel
+def number_halves(corners, offsets, corner_edges, edges, half_edges, begin, end, halves):
+    """Assign numbers to both halves of the edges that first appear in faces begin … end − 1.
+
+    ``halves`` (E, 2), out: the half at the lower endpoint, and at the higher.
+    """
+    following = offsets[begin] + 2 * opened_before(half_edges, offsets[begin])
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        for h in range(first, stop):
+            before = h - 1 if h > first else stop - 1
+            leaving, entering, vertex = corner_edges[h], corner_edges[before], corners[h]
+            if half_edges[leaving, 0] == h:
+                halves[leaving, 0 if vertex == edges[leaving, 0] else 1] = following
+                following += 1
+            following += _inner_edges(h, first, stop)
+            if half_edges[entering, 0] == before:
+                halves[entering, 0 if vertex == edges[entering, 0] else 1] = following
+                following += 1
+
+
+@inlined
+def _inner_edges(h, first, stop):
+    """Return how many inner edges appear first in the quad of corner h."""
+    return 2 if h == first else 1 if h + 1 < stop else 0
+
+
+@inlined
+def _half_at(h, vertex, corners, offsets, face_of_corner):
+    """Return the half of a parent's half-edge that is at ``vertex``."""
+    if corners[h] == vertex:
+        return QUAD * h
+    return QUAD * following_corner(h, offsets, face_of_corner) + 3
+
+
+@inlined
+def _write_half(e, vertex, child, parent, vertex_count, half_edges, edge_class, to):
+    """Write a half of edge e: as many half-edges as e, of e's class."""
+    corners, offsets, face_of_corner = parent
+    to_edges, to_half_edges, to_class = to
+    to_edges[child, 0], to_edges[child, 1] = vertex, vertex_count + e
+    first, second = half_edges[e, 0], half_edges[e, 1]
+    to_half_edges[child, 0] = _half_at(first, vertex, corners, offsets, face_of_corner)
+    to_half_edges[child, 1] = (
+        second if second < 0 else _half_at(second, vertex, corners, offsets, face_of_corner)
+    )
+    to_class[child] = edge_class[e]
+
+
+@kernel
+def split_edges(
+    corners,
+    offsets,
+    face_of_corner,
+    corner_edges,
+    half_edges,
+    edge_class,
+    edges,
+    halves,
+    vertex_count,
+    begin,
+    end,
+    to_corner_edges,
+    to_edges,
+    to_half_edges,
+    to_class,
+):
+    """Write the edges of the quads of faces begin … end − 1."""
+    parent, to = (corners, offsets, face_of_corner), (to_edges, to_half_edges, to_class)
+    face_vertex = vertex_count + edges.shape[0]
+    following = offsets[begin] + 2 * opened_before(half_edges, offsets[begin])
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        inner_before, inner_of_last = -1, -1
+        for h in range(first, stop):
+            before = h - 1 if h > first else stop - 1
+            leaving, entering, vertex = corner_edges[h], corner_edges[before], corners[h]
+            out_of = halves[leaving, 0 if vertex == edges[leaving, 0] else 1]
+            into = halves[entering, 0 if vertex == edges[entering, 0] else 1]
+            if half_edges[leaving, 0] == h:
+                _write_half(
+                    leaving, vertex, out_of, parent, vertex_count, half_edges, edge_class, to
+                )
+                following += 1
+            inner = following if h + 1 < stop else inner_of_last
+            if h == first:
+                inner_of_last = inner_before = following + 1
+                to_half_edges[inner_of_last, 0] = QUAD * first + 2
+                to_half_edges[inner_of_last, 1] = QUAD * (stop - 1) + 1
+            if h + 1 < stop:
+                to_half_edges[inner, 0] = QUAD * h + 1
+                to_half_edges[inner, 1] = QUAD * (h + 1) + 2
+            following += _inner_edges(h, first, stop)
+            to_edges[inner, 0], to_edges[inner, 1] = vertex_count + leaving, face_vertex + f
+            to_class[inner] = INTERIOR
+            if half_edges[entering, 0] == before:
+                _write_half(
+                    entering, vertex, into, parent, vertex_count, half_edges, edge_class, to
+                )
+                following += 1
+            to_corner_edges[h, 0], to_corner_edges[h, 1] = out_of, inner
+            to_corner_edges[h, 2], to_corner_edges[h, 3] = inner_before, into
+            inner_before = inner
+
+
+# --- measurements of the quads --------------------------------------------------------------------
+
+
+@inlined
+def quad_normal(p, q, r, s):
+    """Return the unit normal of a quad p q r s: that of its area vector; 0 without area."""
+    u, v = difference(r, p), difference(s, q)
+    vector = cross(u, v)
+    shortest = NO_AREA * (dot(u, u) + dot(v, v))
+    if dot(vector, vector) > shortest * shortest:
+        return over(vector, norm(vector))
+    return 0.0, 0.0, 0.0
+
+
+@kernel
+def child_normals(
+    points, corners, offsets, corner_edges, vertex_count, face_vertex, begin, end, normals
+):
+    """Write the unit normals of the quads of faces begin … end − 1."""
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        for h in range(first, stop):
+            before = corner_edges[h - 1 if h > first else stop - 1]
+            normal = quad_normal(
+                row(points, corners[h]),
+                row(points, vertex_count + corner_edges[h]),
+                row(points, face_vertex + f),
+                row(points, vertex_count + before),
+            )
+            for k in range(3):
+                normals[h, k] = normal[k]
+
+
+@kernel
+def largest_chord_inside(normals, offsets, begin, end):
+    """Return the largest squared chord between neighbouring quads of faces begin … end − 1."""
+    largest = 0.0
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        for h in range(first, stop):
+            before = h - 1 if h > first else stop - 1
+            largest = max(largest, squared_chord(normals, before, h))
+    return largest
+
+
+@kernel
+def largest_chord_across(normals, offsets, face_of_corner, half_edges, edge_class, begin, end):
+    """Return the largest squared chord across the halves of interior edges begin … end − 1."""
+    largest = 0.0
+    for e in range(max(begin, 0), end):
+        if edge_class[e] == INTERIOR:
+            there, back = half_edges[e, 0], half_edges[e, 1]
+            beyond = following_corner(there, offsets, face_of_corner)
+            largest = max(
+                largest,
+                squared_chord(normals, there, following_corner(back, offsets, face_of_corner)),
+                squared_chord(normals, beyond, back),
+            )
+    return largest

@@ -1,0 +1,67 @@
+"""Catmull–Clark subdivision of polygons (Catmull and Clark 1978), with sharp and soft creases.
+
+    face vertex          the mean of the face's corners
+    edge vertex          (a + b + both face vertices) / 4
+    vertex vertex        (k − 2)/k p + 1/k² Σ neighbours + 1/k² Σ face vertices
+    sharp edge           the midpoint
+    on a sharp curve     3/4 p + 1/8 (the two neighbours along it)
+    corner               p
+
+Sharp and soft edges are as in Loop's scheme (``schemes.loop``). k is the number of a vertex's
+corners, and each corner brings half of both neighbours along its face: in a closed fan every
+neighbour counts once. A vertex of a single corner and no curve stays.
+
+Every face of n corners becomes n quads, so all faces are quads from the first level on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from pns_common.base_scheme import WIDTH, in_threes
+from pns_common.kernels import catmull_clark as kernels
+from pns_common.kernels import loop
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+
+
+def place(
+    values: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
+) -> Float[np.ndarray, "W K"]:
+    """Apply the masks to any columns: rows of old vertices, then of edges, then of faces."""
+    rows = topology.vertex_count + len(topology.edges) + topology.face_count
+    return in_threes(values, rows, lambda three: _place_three(three, topology, blocks))
+
+
+def _place_three(
+    points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
+) -> Float[np.ndarray, "W 3"]:
+    mesh, count, edge_count = topology, topology.vertex_count, len(topology.edges)
+    placed = np.empty((count + edge_count + mesh.face_count, WIDTH))
+    vertices, at_edges, at_faces = np.split(placed, [count, count + edge_count])
+    faces = mesh.corners, mesh.offsets
+    blocks.run(
+        mesh.face_count,
+        lambda begin, end: kernels.place_faces(points, *faces, begin, end, at_faces),
+    )
+    read = mesh.edges, mesh.half_edges, mesh.face_of_corner, mesh.edge_class, mesh.soft
+    blocks.run(
+        edge_count,
+        lambda begin, end: kernels.place_edges(points, at_faces, *read, begin, end, at_edges),
+    )
+    around, counts = (*faces, mesh.face_of_corner, mesh.corner_reach), np.empty(count, np.int32)
+    blocks.owners(count).run(
+        count,
+        lambda begin, end: kernels.sum_corners(
+            points, at_faces, *around, begin, end, vertices, counts
+        ),
+    )
+    blocks.run(
+        count, lambda begin, end: kernels.blend_corners(points, counts, begin, end, vertices)
+    )
+    sharp = mesh.sharpest
+    if sharp is not None:
+        curve = loop.CURVE_CENTRE, loop.CURVE_NEIGHBOUR
+        loop.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, vertices)
+    return placed
