@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
+from pns_common.kernels import measures
 from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.normals import measure_faces
 from pns_common.parallel import Blocks
@@ -66,8 +67,19 @@ class Creases:
         """Return whether the edges are sharp at a level; level 0 refines the control mesh."""
         return self.levels is None or depth < self.levels
 
-    def applied(self, points: Float[np.ndarray, "V 3"], topology: Topology) -> Topology:
+    def applied(
+        self,
+        points: Float[np.ndarray, "V 3"],
+        topology: Topology,
+        normals: Float[np.ndarray, "F 3"] | None = None,
+        blocks: Blocks | None = None,
+    ) -> Topology:
         """Return the topology with these edges as creases.
+
+        Args:
+            points, topology: the mesh.
+            normals: unit normals of its faces; measured where they are None and needed.
+            blocks: how the work is shared.
 
         Raises:
             ParameterError: a named pair is no edge of the mesh.
@@ -75,16 +87,20 @@ class Creases:
         if self.named is not None and len(self.named):
             topology = topology.with_creases(topology.rows_of(self.named))
         if self.angle is not None:
-            topology = topology.with_creases(self.found(points, topology))
+            topology = topology.with_creases(self.found(points, topology, normals, blocks))
         return topology
 
     def found(
-        self, points: Float[np.ndarray, "V 3"], topology: Topology
+        self,
+        points: Float[np.ndarray, "V 3"],
+        topology: Topology,
+        normals: Float[np.ndarray, "F 3"] | None = None,
+        blocks: Blocks | None = None,
     ) -> Integer[np.ndarray, " N"]:
         """Return the interior edges that are found by their angle."""
         if self.angle is None:
             return np.zeros(0, dtype=np.int64)
-        cosine = edge_cosines(points, topology)
+        cosine = edge_cosines(points, topology, normals, blocks)
         rows = np.flatnonzero(cosine < np.cos(np.radians(self.angle)))
         if self.seed is None or len(rows) == 0:
             return rows
@@ -128,15 +144,21 @@ def chosen_creases(
     return given if isinstance(given, Creases) else Creases(given)
 
 
-def edge_cosines(points: Float[np.ndarray, "V 3"], topology: Topology) -> Float[np.ndarray, " E"]:
+def edge_cosines(
+    points: Float[np.ndarray, "V 3"],
+    topology: Topology,
+    normals: Float[np.ndarray, "F 3"] | None = None,
+    blocks: Blocks | None = None,
+) -> Float[np.ndarray, " E"]:
     """Return n1 · n2 of interior edges; 1 at other edges and beside faces without area."""
-    normals, _ = measure_faces(points, topology, Blocks(), areas=False)
-    cosine = np.ones(len(topology.edges))
-    rows = topology.interior
-    sides = topology.face_of(topology.half_edges[rows])
-    n, m = normals[sides[:, 0]], normals[sides[:, 1]]
-    known = n.any(axis=1) & m.any(axis=1)
-    cosine[rows] = np.where(known, np.einsum("ij,ij->i", n, m), 1.0)
+    if normals is None:
+        normals, _ = measure_faces(points, topology, blocks or Blocks(), areas=False)
+    cosine = np.empty(len(topology.edges))
+    read = topology.face_of_corner, topology.half_edges, topology.edge_class
+    (blocks or Blocks()).run(
+        len(cosine),
+        lambda begin, end: measures.turn_cosines(normals, *read, begin, end, cosine),
+    )
     return cosine
 
 

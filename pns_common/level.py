@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.base_scheme import BaseScheme
+from pns_common.creases import Creases
 from pns_common.kernels import connectivity, measures
 from pns_common.normals import NO_AREAS, measure_faces
 from pns_common.parallel import Blocks
@@ -60,6 +61,15 @@ class Level:
     base: BaseScheme
     reference_length: float | None
     blocks: Blocks
+
+    def with_creases(self, creases: Creases) -> Level:
+        """Return the level with some edges kept sharp, and what is known of its faces."""
+        normals = None if creases.angle is None else self.normals
+        quiet = self.blocks.quiet()
+        made = replace(self, topology=creases.applied(self.points, self.topology, normals, quiet))
+        if normals is not None:
+            vars(made)["faces"] = self.faces
+        return made
 
     def measure(self, *, rings: bool, bends: bool) -> None:
         """Make the measurements that several threads are about to read."""

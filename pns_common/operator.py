@@ -32,6 +32,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count as rounds_from_0
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
@@ -42,12 +43,10 @@ from pns_common.kernels import children, correction, frames, measures
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
 
-# Rows of each call of a network: fixed, so that answers do not depend on threads.
-NETWORK_ROWS = 8192
+# Rows of each call of a network: fixed, so that answers do not depend on threads; one chunk.
+NETWORK_ROWS = 4096
 # After so many halvings s becomes 0.
 ROUNDS = 30
-# The tanh of this and more is 1 in float64.
-SATURATED = 22.0
 EVERYWHERE, NONE_SHARED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
 
 # Features (N, K) → answers (N, A).
@@ -70,6 +69,7 @@ class Rule:
         curve_strength: strength of d on boundaries and creases.
         network_scale: τ.
         fold_angle: θ in degrees, above 0 and below 90; read with a prior alone.
+        feature_type: the floating type in which the networks read φ.
         sharpness_network: ψ → sharpness in [0, 1], (N, 1) (sharpness.py); None: none is learned.
     """
 
@@ -84,6 +84,7 @@ class Rule:
     curve_strength: float = 0.0
     network_scale: float = 1.0
     fold_angle: float = 75.0
+    feature_type: type[np.floating[Any]] = np.float64
     sharpness_network: Network | None = None
 
 
@@ -226,31 +227,20 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
 def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
     """Return what surrounds the network at interior edges."""
     mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
-    basis, features = np.empty((count, 9)), np.empty((count, rule.feature_count))
-    curvature, degenerate = np.empty(count), np.empty(count, dtype=bool)
-    frames.frames_and_features(
-        level.points,
-        level.normals,
-        level.rings.fields if signed else np.zeros((0, measures.FIELDS)),
-        level.logs,
-        mesh.corners,
-        mesh.edges,
-        mesh.corner_edges,
-        mesh.half_edges,
-        rows,
-        0,
-        count,
-        rule.symmetric,
-        basis,
-        curvature,
-        degenerate,
-        features,
-    )
-    length, gate = level.edges.lengths[rows], gate_of(rule.gate_sharpness * curvature**2)
-    if rule.prior_strength is not None:
+    basis = np.empty((count, 9))
+    features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
+    (curvature, sides, length), degenerate = np.empty((3, count)), np.empty(count, dtype=bool)
+    has_prior = rule.prior_strength is not None
+    fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
+    bends = level.face_bends if has_prior else level.logs[:0]
+    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
+    of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
+    to = basis, curvature, sides, length, degenerate, features
+    frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
+    gate = np.tanh(rule.gate_sharpness * curvature**2)
+    if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.
-        sides = level.face_bends[mesh.half_edges[rows] // 3].min(axis=1)
-        gate += (1 - gate) * np.where(degenerate, 0.0, gate_of(rule.vertex_gate_sharpness * sides))
+        gate += (1 - gate) * np.tanh(rule.vertex_gate_sharpness * sides)
     return Inputs(
         rows,
         features,
@@ -266,7 +256,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
 def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
     """Return what surrounds the network at old vertices with a closed ring."""
     rings, count, sharp = level.rings, len(rows), level.topology.sharpest
-    features, basis = np.empty((count, 10)), np.empty((count, 9))
+    features, basis = np.empty((count, 10), dtype=rule.feature_type), np.empty((count, 9))
     measures.vertex_features(rings.means, rings.fields, rows, 0, count, features)
     measures.ring_basis(rings.means, rings.fields, rows, 0, count, basis)
     square = rings.means[rows, measures.SQUARE]
@@ -275,7 +265,7 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
         rows,
         features,
         basis,
-        gate=gate_of(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
+        gate=np.tanh(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
         bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * np.sqrt(square),
         weight=1 - sharp.weights[rows, 1] if sharp is not None and soft else np.ones(count),
@@ -288,16 +278,6 @@ def budget_per_length(level: Level, rule: Rule) -> float:
     if not level.reference_length:
         raise ParameterError("reference_length", level.reference_length, expected="R > 0")
     return rule.budget / level.reference_length
-
-
-def gate_of(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """Return γ = tanh of values ≥ 0. Where that is 1 to the last bit, tanh is not evaluated."""
-    small = values < SATURATED
-    if 2 * np.count_nonzero(small) > len(values):
-        return np.tanh(values)
-    gates = np.ones_like(values)
-    gates[small] = np.tanh(values[small])
-    return gates
 
 
 def answers(network: Network | None, at: Inputs) -> Float[np.ndarray, "N 3"]:

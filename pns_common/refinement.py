@@ -170,18 +170,22 @@ def refine(
     told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
 
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
-    points, steps = mesh.vertices, list[Step]()
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    level, steps = level.with_creases(kept), list[Step]()
     for depth in range(count):
         if steps:
-            topology = scheme.base.split(topology, blocks, inherit=kept.sharp_at(depth))
-        steps.append(_step(Level(points, topology, scheme.base, length, blocks), scheme, depth))
-        points = steps[-1].points
+            topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
+            level = Level(steps[-1].points, topology, scheme.base, length, blocks)
+        steps.append(_step(level, scheme, depth))
+        level = steps[-1].level  # without measurements
         if told:
             told.level_ends()
-    faces, normals, shift = scheme.base.faces(topology, blocks, np.int64), None, 0.0
-    if limit:
-        last = scheme.base.split(topology, blocks)
+    points, normals, shift = steps[-1].points, None, 0.0
+    if not limit:
+        faces = scheme.base.faces(level.topology, blocks, np.int64)
+    else:
+        last = scheme.base.split(level.topology, blocks)
+        faces = last.corners.astype(np.int64).reshape(last.face_count, -1)
         surface = last, blocks, scheme.base
         shift = limit_shift(points, *surface)
         normals = limit_normals(points, *surface).vertices
@@ -238,9 +242,9 @@ def control_level(
     """
     blocks = Blocks(_threads(threads))
     kept = chosen_creases(creases, scheme.creases)
-    topology = kept.applied(mesh.vertices, mesh.topology(blocks))
     length = _reference_length(mesh, reference_length, measured=True)
-    return Level(mesh.vertices, topology, scheme.base, length, blocks)
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    return level.with_creases(kept)
 
 
 def refine_many(

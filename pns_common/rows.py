@@ -79,24 +79,6 @@ def marked(rows: Integer[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"
     return marks
 
 
-def stable_sort(
-    key: Integer[np.ndarray, " N"],
-) -> tuple[Integer[np.ndarray, " N"], Integer[np.ndarray, " N"]]:
-    """Return keys ≥ 0 in order, and the positions they come from; equal keys keep their order.
-
-    Packing key and position into one integer and sorting values is several times faster than
-    argsort; where the pack would overflow, argsort serves.
-    """
-    bits = len(key).bit_length()
-    if len(key) and int(key.max()) < 2 ** (63 - bits):
-        packed = key.astype(np.int64) << bits
-        packed |= np.arange(len(key))
-        packed.sort()
-        return packed >> bits, packed & (2**bits - 1)
-    order = np.argsort(key, kind="stable")
-    return key[order], order
-
-
 def extent(
     points: Float[np.ndarray, "N K"],
 ) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, " K"]]:

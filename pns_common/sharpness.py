@@ -20,7 +20,7 @@ from jaxtyping import Float, Integer
 
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
-from pns_common.operator import NETWORK_ROWS, Rule, checked_answers, gate_of
+from pns_common.operator import NETWORK_ROWS, Rule, checked_answers
 from pns_common.topology import Topology
 
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
@@ -90,7 +90,7 @@ def sharpness_inputs(
     """
     seen = turned_edges(level)
     rows = seen.topology.interior
-    return rows, seen.features(rows), gate_of(vertex_gate_sharpness * seen.jumps[rows])
+    return rows, seen.features(rows), np.tanh(vertex_gate_sharpness * seen.jumps[rows])
 
 
 def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
@@ -103,7 +103,7 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
     if network is None:
         return made
     seen = turned_edges(level)
-    gate = gate_of(rule.vertex_gate_sharpness * seen.jumps)
+    gate = np.tanh(rule.vertex_gate_sharpness * seen.jumps)
     rows = np.flatnonzero(gate).astype(np.uint32)
 
     def ask(begin: int, end: int) -> None:

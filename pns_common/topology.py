@@ -277,10 +277,9 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
     repeats, repeating = np.zeros(0, dtype=bool), False
-    # A triangle that names a vertex twice has an edge from a vertex to itself.
-    if not triangles or bool((edges[:, 0] == edges[:, 1]).any()):
+    if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
         repeating = kernels.mark_repeats(corners, offsets, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
@@ -385,7 +384,10 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
+    corners: UInt32[np.ndarray, " H"],
+    offsets: Integer[np.ndarray, " F1"],
+    vertex_count: int,
+    blocks: Blocks,
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -397,9 +399,10 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges = np.empty((made, 2), dtype=np.uint32)
-    edges[:, 0], edges[:, 1] = low[:made], links[:made, kernels.HIGH]
-    half_edges = links[:made, kernels.FIRST :].copy()
+    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
+    blocks.quiet().run(
+        made, lambda begin, end: kernels.read_links(low, links, begin, end, edges, half_edges)
+    )
     return edges, half_edges, corner_edges, bool(plain[0])
 
 
@@ -426,6 +429,7 @@ def _sort_edges(
     corner_edges = number[group]
     sides = np.sort(corner_edges[: 3 * (len(corners) // 3)].reshape(-1, 3), axis=1)
     plain = len(np.unique(_keys(sides[:, :2], len(order)))) == len(sides)
+    plain = plain and bool((pairs[:, 0] != pairs[:, 1]).all())
     return np.sort(pairs[first[order]], axis=1), half_edges, corner_edges, plain
 
 

@@ -6,10 +6,11 @@ and reads all corners.
 
 from __future__ import annotations
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import kernel
 from pns_common.kernels.connectivity import (
     INTERIOR,
     SKIPPED_ROWS,
+    face_of,
     following_corner,
     preceding_corner,
 )
@@ -23,12 +24,6 @@ EDGE_SHARE = 1 / 4
 LEAST_CORNERS = 2
 # A neighbour's weight in the limit mask, in units of an opposite corner's.
 LIMIT_EDGE = 4
-
-
-@inlined
-def face_of(h, face_of_corner):
-    """Return the face of a corner."""
-    return face_of_corner[h] if len(face_of_corner) else h // 3
 
 
 @kernel

@@ -86,6 +86,14 @@ def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, p
     return count
 
 
+@kernel
+def read_links(low, links, begin, end, edges, half_edges):
+    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
+    for e in range(max(begin, 0), end):
+        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
+        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
+
+
 @inlined
 def _may_have_twin(corner_edges, links, f):
     """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
@@ -141,7 +149,7 @@ def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edg
 def _in_repeating_face(face_of_corner, repeats, h):
     if len(repeats) == 0:
         return False
-    return repeats[face_of_corner[h] if len(face_of_corner) else h // 3]
+    return repeats[face_of(h, face_of_corner)]
 
 
 @kernel
@@ -165,6 +173,12 @@ def next_corner(h):
 def previous_corner(h):
     """Return the previous corner of a triangle."""
     return h - 1 + 3 * (h % 3 == 0)
+
+
+@inlined
+def face_of(h, face_of_corner):
+    """Return the face of a corner."""
+    return face_of_corner[h] if len(face_of_corner) else h // 3
 
 
 @inlined

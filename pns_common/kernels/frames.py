@@ -37,7 +37,9 @@ def frames_and_features(
     points,
     normals,
     fields,
+    lengths,
     logs,
+    bends,
     corners,
     edges,
     corner_edges,
@@ -48,6 +50,8 @@ def frames_and_features(
     symmetric,
     frames,
     curvature,
+    sides,
+    length,
     degenerate,
     features,
 ):
@@ -55,11 +59,14 @@ def frames_and_features(
 
     Args:
         fields: (V, 4) mean normals and umbrella heights; read by signed features alone.
-        logs: (E,) logarithms of the lengths.
+        lengths, logs: (E,) lengths and their logarithms.
+        bends: (F,) mean x over the edges of each face; (0,) where it is not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
+        sides: (N,) out: the smaller bend of both faces, 0 where there is no frame.
+        length: (N,) out: h.
         degenerate: (N,) out: whether the frame is the fallback.
         features: (N, K) out; K = 5, 14 or 18.
     """
@@ -84,7 +91,9 @@ def frames_and_features(
             x = 0.0
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
-        curvature[to], degenerate[to] = x, fallback
+        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
+        if len(bends):
+            sides[to] = 0.0 if fallback else min(bends[h1 // 3], bends[h2 // 3])
         features[to, 0] = x
         features[to, LOGS] = logs[ac] - logs[e]
         features[to, LOGS + 1] = logs[bc] - logs[e]

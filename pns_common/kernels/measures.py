@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import inlined, kernel
-from pns_common.kernels.connectivity import INTERIOR, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, face_of, skipped_block
 from pns_common.kernels.vectors import (
     NO_AREA,
     between,
@@ -102,6 +102,18 @@ def measure_edges(
         if square > 0:
             direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
             bends[e] = dot(cross(n, m), direction)
+
+
+@kernel
+def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, cosines):
+    """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
+    for e in range(max(begin, 0), end):
+        cosines[e] = 1.0
+        if edge_class[e] == INTERIOR:
+            n = row(normals, face_of(half_edges[e, 0], face_of_corner))
+            m = row(normals, face_of(half_edges[e, 1], face_of_corner))
+            if dot(n, n) > 0 and dot(m, m) > 0:
+                cosines[e] = dot(n, m)
 
 
 @kernel

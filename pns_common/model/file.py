@@ -83,11 +83,6 @@ def load_model(
     return model_from_bytes(path.read_bytes(), path.stem, providers)
 
 
-def model_name(source: str | os.PathLike[str]) -> str:
-    """Return what the model of a source is called: the bundled name itself, or the file's stem."""
-    return source if _is_bundled(source) else Path(source).stem
-
-
 def _is_bundled(source: str | os.PathLike[str]) -> TypeGuard[str]:
     return isinstance(source, str) and source in bundled_models()
 

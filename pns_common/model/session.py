@@ -81,7 +81,10 @@ class OnnxModel:
         hash: sha256 of the file's bytes.
         size: The file's size in bytes.
         providers: Execution providers of onnxruntime that run it, preferred first.
+        feature_type: In which type features are best given: they are not copied then.
     """
+
+    feature_type = np.float32
 
     def __init__(
         self,
@@ -143,33 +146,38 @@ class OnnxModel:
         if features.ndim != 2 or features.shape[1] != network.columns:
             expected = f"an array of shape (N, {network.columns})"
             raise ParameterError(given, features.shape, expected=expected)
-        session, rows = self._session(), self._rows(network)
-        inputs = self._unread_inputs(budget)
+        session, inputs = self._session(), self._unread_inputs(budget)
         answers = np.empty((len(features), network.answer_columns), dtype=np.float32)
         for start in range(0, len(features), CHUNK_ROWS):
             chunk = features[start : start + CHUNK_ROWS]
-            count = len(chunk)
-            rows[:count] = chunk
-            inputs[given] = rows[: count + -count % ROW_MULTIPLE]
+            inputs[given] = self._padded(network, chunk)
             answer = self._run(session, network.answer, inputs)
             if answer.shape != (len(inputs[given]), network.answer_columns):
                 expected = f"{network.answer} of {network.answer_columns} columns, a row for each"
                 raise ModelError(self.name, expected=expected, found=f"shape {answer.shape}")
-            answers[start : start + count] = answer[:count]
+            answers[start : start + len(chunk)] = answer[: len(chunk)]
         if not np.isfinite(answers).all():
             expected = f"finite numbers in {network.answer}"
             raise ModelError(self.name, expected=expected, found="NaN or infinity")
         return answers
 
-    def _rows(self, network: Network) -> Float32[np.ndarray, "M K"]:
-        """Return the calling thread's array for chunks: a new one for each takes a quarter longer.
+    def _padded(
+        self, network: Network, chunk: Float[np.ndarray, "N K"]
+    ) -> Float32[np.ndarray, "M K"]:
+        """Return a chunk in float32, padded to a multiple of ROW_MULTIPLE rows.
 
-        Rows past the last of a chunk pad it, whatever they hold.
+        What must be copied goes to an array of the calling thread: a new one for each chunk takes a
+        quarter longer. Rows past the last of a chunk pad it, whatever they hold.
         """
+        count = len(chunk)
+        if count % ROW_MULTIPLE == 0 and chunk.dtype == np.float32 and chunk.flags.c_contiguous:
+            return chunk
         kept: dict[str, np.ndarray] = vars(self._of_thread).setdefault("rows", {})
         if network.given not in kept:
             kept[network.given] = np.zeros((CHUNK_ROWS, network.columns), dtype=np.float32)
-        return kept[network.given]
+        rows = kept[network.given]
+        rows[:count] = chunk
+        return rows[: count + -count % ROW_MULTIPLE]
 
     def _unread_inputs(self, budget: float) -> dict[str, np.ndarray]:
         """Return the budget, and one row for each input of features: onnxruntime asks for all."""

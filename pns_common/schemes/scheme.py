@@ -103,6 +103,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         card.orientation == "symmetric",
         card.gate_sharpness,
         budget,
+        feature_type=getattr(model, "feature_type", np.float64),
     )
     if card.format == PAPER_FORMAT:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]

@@ -17,7 +17,6 @@ from pns_common.rows import (
     marked,
     norm,
     number_by_first_appearance,
-    stable_sort,
     unit,
 )
 
@@ -68,18 +67,6 @@ def test_numbers_follow_first_appearance(labels):
     assert places.tolist() == [labels.index(k) if k in labels else -1 for k in range(11)]
     named = marked(np.array(labels, dtype=np.int64), 11)
     assert named.tolist() == [k in labels for k in range(11)]
-
-
-@given(st.lists(st.sampled_from([0, 1, 2, 7, 2**40, 2**62]), max_size=30))
-def test_equal_keys_keep_their_order(keys):
-    expected = sorted(range(len(keys)), key=lambda i: (keys[i], i))
-    ordered, places = stable_sort(np.array(keys, dtype=np.int64))
-    assert places.tolist() == expected
-    assert ordered.tolist() == sorted(keys)
-
-
-def test_narrow_keys_do_not_wrap():
-    assert stable_sort(np.array([3, 1, 2] * 99, dtype=np.int32))[0].max() == 3
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

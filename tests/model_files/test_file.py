@@ -22,7 +22,6 @@ from pns_common.model.file import (
     check_file,
     load_model,
     model_from_bytes,
-    model_name,
 )
 from pns_common.model.session import CHUNK_ROWS
 from tests.support.networks import (
@@ -381,8 +380,6 @@ def test_a_file_is_called_by_its_stem(tmp_path):
         path.write_bytes(GOOD)
         model = load_model(str(path))
         assert (model.name, model.card, model.size) == ("mine", CARD, len(GOOD))
-        assert model_name(path) == "mine"
-    assert model_name("paper") == model_name(Path("other/paper.onnx")) == "paper"
 
 
 def test_a_file_that_is_not_there_lists_the_bundled_names():
