@@ -8,15 +8,13 @@ import msgspec
 import numpy as np
 import pytest
 import torch
-from scipy.spatial import KDTree
 
-from pns_common import Mesh, loop, pns
+from pns_common import loop, pns
 from train.connectivity import connect
 from train.data.pairs import pair_stream as stream
 from train.data.pairs.grid import grid_pair, vertex_normals
 from train.data.pairs.references import Pair, Reference
 from train.data.primitives import box, globe, icosphere, torus
-from train.data.sharp_truth import truly_sharp
 from train.fitting import limit_trainer
 from train.fitting.learned_level import learned_level
 from train.fitting.limit_batch import limit_batch
@@ -35,10 +33,12 @@ SHAPES = {"torus": torus(7, 5), "globe": globe(9, 4), "box": box(1, 2, 3)}
 
 @pytest.fixture(scope="module")
 def no_solids():
-    """The stream of pairs without curved solids, which take a second each to make, and patches."""
-    shares = [0.0, 0.4, 0.2, *[0.4 / (len(stream.SHARES) - 3)] * (len(stream.SHARES) - 3)]
+    """The stream of pairs without solids, which take a second each to make, and patches."""
+    slow = {stream.patch_pair: 0.0}
+    shares = {make: 1 / (len(stream.SHARES) - 1) for make in stream.SHARES} | slow
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stream, "SHARES", dict(zip(stream.SHARES, shares, strict=True)))
+        patch.setattr(stream, "SHARES", shares)
+        patch.setattr(stream, "SHARED", {})
         yield
 
 
@@ -55,7 +55,8 @@ def bold_networks():
     with torch.no_grad():
         for network in (networks.edge, networks.vertex, networks.sharp):
             last = network.linear_layers[-1]
-            last.weight = torch.nn.Parameter(torch.randn(last.weight.shape, generator=generator).double()) if network is networks.sharp else torch.randn(last.weight.shape, generator=generator).double()
+            weight = torch.randn(last.weight.shape, generator=generator).double()
+            last.weight = torch.nn.Parameter(weight) if network is networks.sharp else weight
     return networks
 
 
@@ -133,23 +134,6 @@ def test_measures_see_a_shift(batch):
         points = batch.level.second(smooth, batch.level.first(smooth, None))
         here, away = measure(batch, points), measure(batch, points + torch.tensor([0.3, 0.2, 0.1]))
     assert (away.mean > here.mean + 0.02).all()
-
-
-def test_edges_that_are_sharp_in_truth_are_found():
-    mesh = box(2, 2, 2)
-    dense = box(24, 24, 24)
-    centres = dense.vertices[dense.faces].mean(axis=1)
-    a, b, c = (dense.vertices[dense.faces[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
-    found = truly_sharp(mesh, KDTree(centres), normals)
-    level = connect(mesh.faces, len(mesh.vertices))
-    own = level.edges.numpy()
-    on_rims = (np.abs(mesh.vertices[own].mean(axis=1)) >= np.abs(mesh.vertices).max(axis=0) - 1e-9).sum(axis=1) == 2
-    np.testing.assert_array_equal(found == 1, on_rims)
-    ball = icosphere(2)
-    fine = icosphere(6).vertices
-    assert (truly_sharp(ball, KDTree(fine), fine) == 0).all()
 
 
 def test_batches_made_ahead_are_those_made_here(no_solids, monkeypatch):

@@ -101,14 +101,14 @@ def general(seed: int = 0) -> Recipe:
         gate_sharpness=1e7,
         training=ToLimit(
             weights=LimitWeights(
-                mean=1.0, spread=0.5, peak=0.7, normal=3.0, worse=1.5, worse_from=0.95, sharp=0.3
+                mean=1.0, spread=0.5, peak=0.7, normal=3.0, worse=1.5, worse_from=0.95, sharp=0.5
             ),
             faces=600,
             pool=80,
             reuse=40,
             start=400,
         ),
-        steps=7500,
+        steps=6000,
         learning_rate=2.5e-3,
         seed=seed,
         orientation="symmetric",
@@ -118,7 +118,7 @@ def general(seed: int = 0) -> Recipe:
             prior_strength=1.0,
             boundary_strength=1.0,
             network_scale=0.4,
-            fold_angle=60.0,
+            fold_angle=40.0,
             sharpness_levels=2,
         ),
         sharpness=SharpnessRule("crease-53", hidden=(32, 32)),
