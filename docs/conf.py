@@ -11,7 +11,7 @@ from pns_common.version import VERSION
 
 project = "PNS"
 version = release = VERSION
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 html_theme = "furo"
 html_title = "PNS"
 html_copy_source = False
@@ -20,6 +20,11 @@ html_show_copyright = False
 autodoc_typehints = "none"  # shapes stand in the text
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
+# Notebooks are run, in a folder of their own, and stop the build where they fail.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -16,6 +21,8 @@ from pns_common.topology import Topology, build_topology
 LARGEST_COORDINATE = 1e75
 SMALLEST_EXTENT = 1e-70
 TRIANGLE = 3
+# meshio's names of faces, by their corners; the others are polygons.
+CELLS = {3: "triangle", 4: "quad"}
 
 
 class Mesh:
@@ -87,6 +94,41 @@ class Mesh:
 
     def __repr__(self) -> str:
         return f"Mesh(vertices={len(self.vertices)}, faces={self.face_count})"
+
+    def _repr_html_(self) -> str:
+        counts = {"vertices": len(self.vertices), "faces": len(self.offsets) - 1}
+        return as_html(self, counts)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Mesh:
+        """Read the faces of a file by meshio: OBJ, PLY, STL, OFF and others, by its ending.
+
+        Raises:
+            ImportError: meshio is not installed.
+            MeshError: as ``Mesh``.
+        """
+        read = import_module("meshio").read(path)
+        wanted = {*CELLS.values(), "polygon"}
+        blocks = [block.data for block in read.cells if block.type in wanted]
+        faces = blocks[0] if len(blocks) == 1 else [face for block in blocks for face in block]
+        return cls(read.points, faces)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file by meshio, by its ending; STL and OFF hold triangles alone.
+
+        Raises:
+            ImportError: meshio is not installed.
+        """
+        alike = None if self._faces is None else [(self._faces.shape[1], self._faces)]
+        runs = alike or groupby(self.polygons, len)
+        cells = [(CELLS.get(count, "polygon"), np.array([*rows], np.int32)) for count, rows in runs]
+        import_module("meshio").write_points_cells(path, self.vertices, cells)
+
+    def triangulated(self) -> Mesh:
+        """Cut each face into triangles that meet in its first corner: right for convex faces."""
+        if self.triangles:
+            return self
+        return Mesh(self.vertices, self.corners[fans(self.offsets)[0]])
 
     @property
     def offsets(self) -> Integer[np.ndarray, " F1"]:
@@ -199,6 +241,27 @@ def clean(mesh: Mesh) -> Cleaned:
         dropped_duplicate=int(len(proper) - is_leader.sum()),
         dropped_vertices=int(len(used) - used.sum()),
     )
+
+
+def as_html(mesh: Mesh, counts: Mapping[str, object]) -> str:
+    """Return a table, below a small picture where PyVista is installed: for notebooks."""
+    rows = (f"<tr><th>{k}</th><td>{escape(str(v))}</td></tr>" for k, v in counts.items())
+    try:
+        picture: str = import_module("pns_common.pyvista").picture(mesh)
+    except ImportError:
+        picture = ""
+    return f"{picture}<table>{''.join(rows)}</table>"
+
+
+def fans(
+    offsets: Integer[np.ndarray, " F1"],
+) -> tuple[Integer[np.ndarray, "T 3"], Integer[np.ndarray, " T"]]:
+    """Return the corners of the triangles that faces are cut into, and the face of each."""
+    counts = np.diff(offsets) - 2
+    face = np.repeat(np.arange(len(counts)), counts)
+    step = np.arange(len(face)) - (np.cumsum(counts) - counts)[face] + 1
+    first = offsets[face]
+    return np.stack([first, first + step, first + step + 1], axis=1), face
 
 
 def check_is_mesh(given: object) -> None:

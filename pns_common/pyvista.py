@@ -7,11 +7,15 @@ smooth = mesh.pns.subdivide(levels=2)
 
 from __future__ import annotations
 
+from base64 import b64encode
+from io import BytesIO
 from typing import Any
 
+import numpy as np
 import pyvista
 
 from pns_common.interop.subdivide import subdivide
+from pns_common.mesh import Mesh
 from pns_common.refinement import DEFAULT_LEVELS
 from pns_common.schemes import Scheme, loop
 
@@ -32,3 +36,14 @@ class PnsAccessor:
     def loop(self, levels: int = DEFAULT_LEVELS, **options: Any) -> pyvista.PolyData:
         """Return the mesh refined by Loop's rules alone."""
         return subdivide(self._mesh, levels, loop(), **options)
+
+
+def picture(mesh: Mesh) -> str:
+    """Return a mesh's picture as HTML; edges are drawn where there are few."""
+    padded = np.insert(mesh.corners, mesh.offsets[:-1], np.diff(mesh.offsets))
+    surface = pyvista.PolyData(mesh.vertices, faces=padded)
+    plotter, png = pyvista.Plotter(off_screen=True, window_size=[360, 270]), BytesIO()
+    plotter.add_mesh(surface, color="#c08457", show_edges=len(mesh.offsets) < 2000)
+    plotter.screenshot(png)
+    plotter.close()
+    return f'<img alt="" src="data:image/png;base64,{b64encode(png.getvalue()).decode()}"/>'

@@ -18,7 +18,7 @@ from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.memory import keep_freed_memory, memory_here
-from pns_common.mesh import LARGEST_COORDINATE, Mesh, check_is_mesh
+from pns_common.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
 from pns_common.operator import Additions, learned_level
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
@@ -116,6 +116,11 @@ class Refinement:
         vertices, faces = len(self.mesh.vertices), self.mesh.face_count
         name, levels = self.scheme.name, len(self.steps)
         return f"Refinement({name!r}, levels={levels}, vertices={vertices}, faces={faces})"
+
+    def _repr_html_(self) -> str:
+        counts = {"scheme": self.scheme.name, "levels": len(self.steps)}
+        sizes = {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)}
+        return as_html(self.mesh, counts | sizes)
 
 
 def refine(

@@ -8,6 +8,7 @@ import numpy as np
 
 from pns_common.errors import MeshError
 from pns_common.interop.carried import CarriedMesh
+from pns_common.mesh import fans
 
 
 def read_meshio(mesh: Any) -> CarriedMesh:
@@ -27,6 +28,22 @@ def read_meshio(mesh: Any) -> CarriedMesh:
     if vertices.ndim == 2 and vertices.shape[1] == 2:  # a plane mesh
         vertices = np.column_stack([vertices, np.zeros(len(vertices))])
     return CarriedMesh(vertices, faces, points, cells=cells)
+
+
+def triangulated_meshio(mesh: Any) -> Any:
+    """Return the mesh with its quads and polygons cut into triangles; sets of cells are dropped."""
+    cells, data = list[tuple[str, Any]](), {name: list[Any]() for name in mesh.cell_data}
+    for number, block in enumerate(mesh.cells):
+        kind, faces, parents = block.type, np.asarray(block.data), np.arange(len(block.data))
+        if kind in {"quad", "polygon"}:
+            count = int(faces.shape[1])
+            rows, parents = fans(np.arange(0, faces.size + 1, count))
+            kind, faces = "triangle", faces.reshape(-1)[rows]
+        cells.append((kind, faces))
+        for name, values in mesh.cell_data.items():
+            data[name].append(np.asarray(values[number])[parents])
+    more = {"point_data": mesh.point_data, "point_sets": mesh.point_sets, "info": mesh.info}
+    return type(mesh)(mesh.points, cells, cell_data=data, field_data=mesh.field_data, **more)
 
 
 def write_meshio(refined: CarriedMesh, given: Any) -> Any:

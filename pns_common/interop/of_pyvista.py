@@ -24,7 +24,7 @@ def read_pyvista(mesh: Any) -> CarriedMesh:
         advice = "give pyvista.PolyData(mesh.points, mesh.faces)"
         raise MeshError(f"{what}; {advice}", element="faces")
     if not mesh.is_all_triangles:
-        raise MeshError("not triangles alone; triangulate() it first", element="faces")
+        raise MeshError("not triangles alone; triangulate=True cuts them", element="faces")
     # Normals are those of the old surface: they are computed again where they are wanted.
     normals = {mesh.point_data.active_normals_name, mesh.cell_data.active_normals_name}
     points = {k: np.asarray(v) for k, v in mesh.point_data.items() if k not in normals}

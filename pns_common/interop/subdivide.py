@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import methodcaller
 from types import MappingProxyType
 from typing import Any, SupportsIndex, TypeVar, cast
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from pns_common.errors import ParameterError
 from pns_common.interop.carried import CarriedMesh, refine_carried
-from pns_common.interop.of_meshio import read_meshio, write_meshio
+from pns_common.interop.of_meshio import read_meshio, triangulated_meshio, write_meshio
 from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
@@ -21,24 +22,46 @@ from pns_common.refinement import DEFAULT_LEVELS, refine
 from pns_common.schemes import Scheme, pns
 
 AnyMesh = TypeVar("AnyMesh")
+Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True)
 class Adapter:
-    """Functions that read a library's mesh, and make one like it."""
+    """Functions that read a library's mesh, make one like it, and cut its polygons, if any."""
 
     read: Callable[[Any], CarriedMesh]
     write: Callable[[CarriedMesh, Any], Any]
+    triangulated: Callable[[Any], Any] | None = None
 
 
 # By package and class, so that a mesh is recognised without importing its library.
 ADAPTERS = MappingProxyType(
     {
         ("trimesh", "Trimesh"): Adapter(read_trimesh, write_trimesh),
-        ("pyvista", "PolyData"): Adapter(read_pyvista, write_pyvista),
-        ("meshio", "Mesh"): Adapter(read_meshio, write_meshio),
+        ("pyvista", "PolyData"): Adapter(read_pyvista, write_pyvista, methodcaller("triangulate")),
+        ("meshio", "Mesh"): Adapter(read_meshio, write_meshio, triangulated_meshio),
         ("open3d", "TriangleMesh"): Adapter(read_open3d, write_open3d),
     }
+)
+
+
+def _refined_scene(scene: Any, refined: Callable[[Any], Any]) -> Any:
+    made = scene.copy()
+    for name, part in scene.geometry.items():
+        made.geometry[name] = refined(part)
+    return made
+
+
+def _refined_blocks(blocks: Any, refined: Callable[[Any], Any]) -> Any:
+    made = blocks.copy(deep=False)
+    for index, block in enumerate(blocks):
+        made.replace(index, refined(block))
+    return made
+
+
+# Return a copy of a collection with each part refined.
+COLLECTIONS = MappingProxyType(
+    {("trimesh", "Scene"): _refined_scene, ("pyvista", "MultiBlock"): _refined_blocks}
 )
 
 
@@ -46,18 +69,22 @@ def subdivide(
     mesh: AnyMesh,
     levels: SupportsIndex = DEFAULT_LEVELS,
     scheme: Scheme | None = None,
+    *,
+    triangulate: bool = False,
     **options: Any,
 ) -> AnyMesh:
     """Refine a mesh and return one of the same kind.
 
     Args:
         mesh: a ``Mesh``; a pair (vertices (V, 3), faces (F, 3)) of arrays; a trimesh ``Trimesh``, a
-            pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles.
+            pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles; or
+            a trimesh ``Scene`` or pyvista ``MultiBlock`` of such and other parts, which stay.
             Meshes of a library keep texture coordinates, colours and other data, interpolated
             linearly; their vertices at the same position are one vertex of the surface. A pair and
             a ``Mesh`` are refined as they are.
         levels: number of steps, 1 … 16.
         scheme: None for ``pns(load_model())``.
+        triangulate: cut polygons into triangles first, which is right for convex ones.
         options: further arguments of ``refine``: ``reference_length``, ``creases``, …
 
     Raises:
@@ -65,29 +92,42 @@ def subdivide(
         MeshError: it has other cells than triangles; and as ``refine`` and ``Mesh``.
     """
     given: Any = mesh
-    is_pair = isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2
-    adapter = None if is_pair or isinstance(mesh, Mesh) else _adapter(mesh)
     scheme = pns(load_model()) if scheme is None else scheme
-    if isinstance(mesh, Mesh):
-        return cast(AnyMesh, refine(mesh, scheme, levels, **options).mesh)
-    if adapter is None:
-        vertices, faces = cast(tuple[Any, Any], given)
-        refined = refine(Mesh(vertices, faces), scheme, levels, **options).mesh
+    if collection := _of_class(mesh, COLLECTIONS):
+
+        def refined(part: Any) -> Any:
+            if _of_class(part, COLLECTIONS) is None and _of_class(part, ADAPTERS) is None:
+                return part
+            return subdivide(part, levels, scheme, triangulate=triangulate, **options)
+
+        return cast(AnyMesh, collection(mesh, refined))
+    is_pair = isinstance(given, (tuple, list)) and len(cast(Sequence[Any], given)) == 2
+    if is_pair or isinstance(mesh, Mesh):
+        control = mesh if isinstance(mesh, Mesh) else Mesh(*given)
+        control = control.triangulated() if triangulate else control
+        made = refine(control, scheme, levels, **options).mesh
+        if isinstance(mesh, Mesh):
+            return cast(AnyMesh, made)
         # A tuple with names takes its values one by one, but for this.
         make: Any = getattr(type(mesh), "_make", type(mesh))
-        return make((np.array(refined.vertices), np.array(refined.faces)))
+        return make((np.array(made.vertices), np.array(made.faces)))
+    adapter = _adapter(mesh)
+    if triangulate and adapter.triangulated is not None:
+        mesh = adapter.triangulated(mesh)
     carried, _ = refine_carried(adapter.read(mesh), scheme, levels, options)
     return adapter.write(carried, mesh)
 
 
 def _adapter(mesh: object) -> Adapter:
     """Return the adapter of a mesh's class, or of one that it is derived from."""
-    for base in type(mesh).__mro__:
-        known = ADAPTERS.get((base.__module__.partition(".")[0], base.__name__))
-        if known is not None:
-            return known
-    kinds = ", ".join(f"{package}.{name}" for package, name in ADAPTERS)
-    # trimesh loads a GLB as a scene.
-    others = "of a scene or a file, its meshes one by one"
-    expected = f"a Mesh, a pair of arrays, or {kinds}; {others}"
+    if (known := _of_class(mesh, ADAPTERS)) is not None:
+        return known
+    kinds = ", ".join(f"{package}.{name}" for package, name in (*ADAPTERS, *COLLECTIONS))
+    expected = f"a Mesh, a pair of arrays, or {kinds}"
     raise ParameterError("mesh", type(mesh), expected=expected)
+
+
+def _of_class(thing: object, table: Mapping[tuple[str, str], Kind]) -> Kind | None:
+    """Return the entry of an object's class, or of one that it is derived from."""
+    names = ((base.__module__.partition(".")[0], base.__name__) for base in type(thing).__mro__)
+    return next((table[name] for name in names if name in table), None)

@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
+from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Integer
 
 from pns_common.base_scheme import BaseScheme
-from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases
-from pns_common.errors import ModelError, ParameterError
+from pns_common.creases import ANGLE, NO_CREASES, SEED, Creases, chosen_creases
+from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
+from pns_common.matrix import subdivision_matrix
+from pns_common.mesh import Mesh
 from pns_common.model.session import Model
 from pns_common.operator import Rule
+from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
 from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
@@ -54,6 +59,40 @@ class Scheme:
         if self.rule is None:
             return False
         return self.learned_levels is None or depth < self.learned_levels
+
+    def matrix(
+        self,
+        mesh: Mesh,
+        levels: int = 1,
+        creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    ) -> Any:
+        """Return the base scheme's subdivision matrix S, (W, V), as a ``scipy.sparse.csr_array``.
+
+        S @ columns are the columns of the refined vertices: S @ mesh.vertices is where ``refine``
+        puts them without a learned rule, to rounding. Rows are > 0 and sum to 1.
+
+        Args:
+            mesh: the control mesh.
+            levels: number of steps, at least 1.
+            creases: edges to keep sharp, as for ``refine``.
+
+        Raises:
+            ParameterError: a crease is no edge.
+            MeshError: the mesh has polygons, and the scheme refines triangles alone.
+            ImportError: scipy is not installed.
+        """
+        if not (mesh.triangles or self.base.polygons):
+            if self.for_polygons is None:
+                raise MeshError("polygons, expected triangles", element="faces")
+            return self.for_polygons().matrix(mesh, levels, creases)
+        sparse = import_module("scipy.sparse")
+        kept = chosen_creases(creases, self.creases)
+        topologies = [kept.applied(mesh.vertices, mesh.topology())]
+        for depth in range(1, levels):
+            sharp = kept.sharp_at(depth)
+            topologies.append(self.base.split(topologies[-1], Blocks(), inherit=sharp))
+        made = subdivision_matrix(topologies, self.base)
+        return sparse.csr_array((made.weights, made.columns, made.starts), shape=made.shape)
 
 
 def loop() -> Scheme:

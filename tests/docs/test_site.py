@@ -1,4 +1,7 @@
-"""The documentation builds without a warning, reads without a network, and its Python runs."""
+"""The documentation builds without a warning, reads without a network, and its Python runs.
+
+To build it runs the notebooks, and fails where one of them does.
+"""
 
 import re
 import subprocess
@@ -36,7 +39,8 @@ def test_the_site_has_every_page_in_its_menu(site):
             r'toctree-l1[^"]*"><a class="[^"]*" href="([^"]+)"', (site / "index.html").read_text()
         )
     )
-    pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in DOCS.rglob("*.md")}
+    sources = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in sources}
     assert menu == pages - {"index.html"}
 
 
@@ -51,13 +55,19 @@ def test_the_readme_is_read_in_five_and_has_no_greek_before_its_picture():
     assert not re.search("[α-ωΑ-Ω]", text.partition("![")[0])
 
 
+@pytest.mark.parametrize("notebook", sorted(DOCS.rglob("*.ipynb")), ids=lambda path: path.stem)
+def test_a_notebook_has_pictures(site, notebook):
+    page = (site / notebook.relative_to(DOCS).with_suffix(".html")).read_text()
+    assert len(re.findall(r'<img [^>]*src="(?:data:image/png|\.\./_images/)', page)) >= 2
+
+
 def test_the_site_loads_nothing_from_elsewhere(site):
     for page in site.rglob("*.html"):
         loaded = re.findall(
             r"<(?:script|img|link)\b[^>]*?\b(?:src|href)=\"([^\"]+)\"", page.read_text()
         )
         assert loaded
-        assert not [address for address in loaded if "//" in address]
+        assert not [a for a in loaded if "//" in a and not a.startswith("data:")]
 
 
 def test_every_public_name_is_on_the_api_page(site):
@@ -80,7 +90,7 @@ def test_a_page_links_to_files_that_exist(page):
 def test_a_pages_python_runs(page, tmp_path):
     """One snippet after the other, as a reader would type them."""
     code = "\n".join(PYTHON.findall(page.read_text()))
-    script = tmp_path / f"{page.stem}.py"
+    script = tmp_path / "snippets.py"
     script.write_text(code)
     done = subprocess.run(
         [sys.executable, "-W", "error", script],

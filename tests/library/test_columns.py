@@ -5,23 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Creases, Mesh, MeshError, ParameterError, loop, refine
+from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
 from pns_common.columns import (
     ColumnRefinement,
     level_topologies,
     refine_columns,
-    subdivision_matrix,
 )
 from pns_common.limit import limit_positions
+from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
+from pns_common.schemes import LOOP, catmull_clark
 from pns_common.topology import build_topology
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
-
-
-def applied(matrix, columns):
-    made = np.zeros((matrix.shape[0], columns.shape[1]))
-    np.add.at(made, matrix.rows, matrix.weights[:, None] * columns[matrix.columns])
-    return made
 
 
 @pytest.mark.parametrize("limit", [False, True])
@@ -39,29 +34,50 @@ def test_positions_as_columns_are_refined_as_positions(limit, sharp_levels):
     np.testing.assert_array_equal(again, refined)
 
 
+@given(st.one_of(manifolds(), soups()), st.integers(1, 3))
+def test_the_matrix_times_vertices_are_loops_vertices(mesh, levels):
+    matrix = loop().matrix(mesh, levels)
+    assert (matrix.data > 0).all()
+    np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-15)
+    made = refine(mesh, loop(), levels).mesh.vertices
+    assert np.abs(matrix @ mesh.vertices - made).max() <= 1e-15 * (1 + np.abs(mesh.vertices).max())
+
+
+def test_the_matrix_of_polygons_gives_catmull_clarks_vertices():
+    mesh = Mesh(np.random.default_rng(0).standard_normal((8, 3)), [[0, 1, 3, 2], [1, 4, 5, 6, 3]])
+    made = refine(mesh, catmull_clark(), 2).mesh.vertices
+    given = catmull_clark().matrix(mesh, 2) @ mesh.vertices
+    np.testing.assert_allclose(given, made, rtol=0, atol=2e-15)
+    with pytest.raises(MeshError, match="expected triangles"):
+        loop().matrix(mesh)
+
+
+def test_creases_are_those_that_refine_keeps():
+    mesh = Mesh(*grid(6, bent))
+    for creases in (Creases(np.array([[7, 8], [8, 14]]), levels=1), Creases(angle=20), None):
+        for scheme in (loop(), pns(load_model(), budget=0)):
+            made = refine(mesh, scheme, 2, creases=creases).mesh.vertices
+            given = scheme.matrix(mesh, 2, creases) @ mesh.vertices
+            np.testing.assert_allclose(given, made, rtol=0, atol=1e-15)
+
+
 @given(st.one_of(manifolds(), soups()), st.integers(0, 2**31), st.integers(1, 2))
-def test_the_matrix_times_columns_are_the_refined_columns(mesh, seed, levels):
+def test_half_sharp_edges_are_in_it(mesh, seed, levels):
     rng = np.random.default_rng(seed)
     topologies = level_topologies(mesh.faces, len(mesh.vertices), levels)
     topologies[0] = topologies[0].with_sharpness(rng.choice([0, 0.4, 1], len(topologies[0].edges)))
-    matrix, columns = subdivision_matrix(topologies), rng.standard_normal((len(mesh.vertices), 4))
-    made = refine_columns(columns, topologies)
-    assert matrix.shape == (len(made), len(columns))
-    np.testing.assert_allclose(applied(matrix, columns), made, atol=1e-14)
-    # Convex, sorted, and nothing twice.
-    assert matrix.weights.min() > 0
-    np.testing.assert_allclose(np.bincount(matrix.rows, matrix.weights), 1, atol=1e-14)
+    matrix, columns = subdivision_matrix(topologies, LOOP), rng.standard_normal(len(mesh.vertices))
     assert (np.diff(matrix.rows * matrix.shape[1] + matrix.columns) > 0).all()
+    products = np.bincount(matrix.rows, matrix.weights * columns[matrix.columns])
+    made = refine_columns(columns[:, None], topologies)[:, 0]
+    np.testing.assert_allclose(products, made, atol=1e-14)
 
 
 def test_the_matrix_of_one_level_holds_loops_masks():
-    matrix = subdivision_matrix(level_topologies(np.array([[0, 1, 2], [2, 1, 3]]), 4, 1))
-    rows = [matrix.rows == row for row in range(9)]
+    matrix = loop().matrix(Mesh(np.eye(4, 3), [[0, 1, 2], [2, 1, 3]])).toarray()
     # An interior edge between 1 and 2; the vertex of valence 2 at 0, on the boundary.
-    assert matrix.columns[rows[5]].tolist() == [0, 1, 2, 3]
-    assert matrix.weights[rows[5]].tolist() == [1 / 8, 3 / 8, 3 / 8, 1 / 8]
-    assert matrix.columns[rows[0]].tolist() == [0, 1, 2]
-    assert matrix.weights[rows[0]].tolist() == [3 / 4, 1 / 8, 1 / 8]
+    assert matrix[5].tolist() == [1 / 8, 3 / 8, 3 / 8, 1 / 8]
+    assert matrix[0].tolist() == [3 / 4, 1 / 8, 1 / 8, 0]
 
 
 def test_vertices_without_faces_stay():
@@ -69,8 +85,8 @@ def test_vertices_without_faces_stay():
     topologies = level_topologies(faces, len(points) + 1, 1)
     columns = np.vstack([points, [[9.0, 9, 9]]])
     assert refine_columns(columns, topologies)[len(points)].tolist() == [9, 9, 9]
-    matrix = subdivision_matrix(topologies)
-    assert matrix.columns[matrix.rows == len(points)].tolist() == [len(points)]
+    row = loop().matrix(Mesh(columns, faces))[[len(points)]]
+    assert (row.indices.tolist(), row.data.tolist()) == ([len(points)], [1])
 
 
 def test_one_map_serves_many_columns():

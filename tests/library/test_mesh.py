@@ -119,3 +119,37 @@ def test_faces_of_any_degree_are_kept_and_named_in_errors():
         Mesh(points, [[0, 1, 2], [0, 2, 3, 9]])
     with pytest.raises(MeshError, match="expected triangles"):
         refine(quads, loop())
+
+
+PYRAMID = [[3, 2, 1, 0], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "vtk"])
+def test_a_saved_mesh_is_loaded_as_it_was(tmp_path, ending):
+    pytest.importorskip("meshio")
+    points = np.random.default_rng(0).standard_normal((5, 3))
+    for faces in (PYRAMID, PYRAMID[1:], PYRAMID[:1]):
+        Mesh(points, faces).save(tmp_path / f"mesh.{ending}")
+        again = Mesh.load(tmp_path / f"mesh.{ending}")
+        np.testing.assert_array_equal(again.vertices, points)
+        assert [face.tolist() for face in again.polygons] == faces
+
+
+def test_a_saved_file_is_read_by_others(tmp_path):
+    pytest.importorskip("meshio")
+    trimesh = pytest.importorskip("trimesh")
+    mesh = Mesh(np.random.default_rng(0).standard_normal((5, 3)), PYRAMID).triangulated()
+    for ending in ("obj", "ply", "stl", "off"):
+        mesh.save(tmp_path / f"mesh.{ending}")
+        read = trimesh.load_mesh(tmp_path / f"mesh.{ending}", process=False)
+        np.testing.assert_allclose(read.triangles, mesh.vertices[mesh.faces], atol=1e-6)
+
+
+def test_a_polygon_is_cut_from_its_first_corner():
+    angles = np.arange(5) * 2 * np.pi / 5
+    points = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    mesh = Mesh(points, [[1, 2, 3, 4, 0]])
+    assert mesh.triangulated().faces.tolist() == [[1, 2, 3], [1, 3, 4], [1, 4, 0]]
+    pyramid = Mesh(np.eye(5, 3), PYRAMID).triangulated()
+    assert pyramid.faces.tolist() == [[3, 2, 1], [3, 1, 0], *PYRAMID[1:]]
+    assert pyramid.triangulated() is pyramid

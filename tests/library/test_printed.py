@@ -1,5 +1,8 @@
 """What a user prints while trying things out fits a line, whatever it holds."""
 
+import sys
+from base64 import b64decode
+
 import pytest
 
 from pns_common import Mesh, load_model, loop, pns, refine
@@ -22,3 +25,16 @@ MESH = Mesh(*bumpy_sphere(0))
 def test_it_fits_a_line(value, said):
     assert repr(value).startswith(said)
     assert len(repr(value)) <= 100
+
+
+@pytest.mark.parametrize("value", [MESH, refine(MESH, loop(), 1)])
+def test_a_notebook_shows_a_picture_over_the_counts(value, monkeypatch):
+    pytest.importorskip("pyvista")
+    picture, _, table = value._repr_html_().partition("<table>")
+    png = b64decode(picture.partition("base64,")[2].partition('"')[0])
+    assert png.startswith(b"\x89PNG")
+    assert len(png) < 100_000
+    count = len(getattr(value, "mesh", value).vertices)
+    assert f"<th>vertices</th><td>{count}</td>" in table
+    monkeypatch.setitem(sys.modules, "pns_common.pyvista", None)
+    assert value._repr_html_() == "<table>" + table

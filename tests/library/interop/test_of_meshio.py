@@ -49,3 +49,10 @@ class TestMeshio:
     def test_other_cells_are_refused_by_name(self, cells):
         with pytest.raises(MeshError, match=r"cells of type (quad|none)"):
             subdivide(self.meshio.Mesh(np.eye(4)[:, :3], cells))
+
+    def test_quads_and_polygons_are_cut_with_their_data(self):
+        blocks = [("quad", [[3, 2, 1, 0]]), ("triangle", [[0, 1, 2]])]
+        given = self.meshio.Mesh(np.eye(4, 3), blocks, cell_data={"part": [[5], [6]]})
+        refined = subdivide(given, 1, SCHEME, triangulate=True)
+        assert [block.data.shape for block in refined.cells] == [(8, 3), (4, 3)]
+        assert [values.tolist() for values in refined.cell_data["part"]] == [[5] * 8, [6] * 4]

@@ -41,3 +41,22 @@ class TestOpen3d:
         refined = subdivide(mesh, 1, loop())
         assert refined.has_triangle_normals()
         assert not refined.has_vertex_normals()
+
+    def test_tensors_stay_of_their_type(self, mesh):
+        open3d = pytest.importorskip("open3d")
+        given = open3d.t.geometry.TriangleMesh.from_legacy(mesh)
+        given.vertex["heat"] = open3d.core.Tensor(VERTICES[:, :1])
+        given.compute_vertex_normals()
+        refined = subdivide(given, 2, SCHEME)
+        assert type(refined) is type(given)
+        kinds = [refined.vertex.positions.dtype, refined.triangle.indices.dtype]
+        assert kinds == [given.vertex.positions.dtype, given.triangle.indices.dtype]
+        np.testing.assert_array_equal(refined.triangle.indices.numpy(), EXPECTED.faces)
+        np.testing.assert_allclose(
+            refined.vertex.positions.numpy(), EXPECTED.vertices, rtol=1e-5, atol=1e-6
+        )
+        heat = split_uv(VERTICES[:, :1])
+        np.testing.assert_allclose(refined.vertex["heat"].numpy(), heat, atol=1e-12)
+        uv = split_uv(UV)[EXPECTED.faces]
+        np.testing.assert_allclose(refined.triangle["texture_uvs"].numpy(), uv, atol=1e-6)
+        assert refined.vertex["normals"].shape == [len(EXPECTED.vertices), 3]

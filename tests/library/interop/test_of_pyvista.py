@@ -56,3 +56,18 @@ class TestPyvista:
         for cloud in (self.pyvista.PolyData(), self.pyvista.PolyData(VERTICES)):
             with pytest.raises(MeshError, match="no faces"):
                 subdivide(cloud)
+
+    def test_blocks_keep_their_names_and_what_is_no_surface(self):
+        inner = self.pyvista.MultiBlock({"blob": self.mesh(), "none": None})
+        blocks = self.pyvista.MultiBlock({"inner": inner, "grid": self.pyvista.ImageData()})
+        refined = subdivide(blocks, 2, SCHEME)
+        assert refined.keys() == ["inner", "grid"]
+        same_surface(refined["inner"]["blob"].points, refined["inner"]["blob"].regular_faces)
+        assert refined["inner"]["none"] is None
+        assert blocks["inner"]["blob"].n_cells == len(FACES)
+
+    def test_polygons_are_cut_with_their_data(self):
+        plane = self.pyvista.Plane(i_resolution=2, j_resolution=1)
+        plane.cell_data["side"] = [0, 1]
+        refined = subdivide(plane, 1, SCHEME, triangulate=True)
+        assert refined.cell_data["side"].tolist() == [0] * 8 + [1] * 8

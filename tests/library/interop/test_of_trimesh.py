@@ -76,3 +76,14 @@ class TestTrimesh:
             pass
 
         assert type(subdivide(Part(VERTICES, FACES), scheme=loop())) is Part
+
+    def test_a_scene_keeps_its_graph_and_what_is_no_mesh(self):
+        scene = self.trimesh.Scene()
+        scene.add_geometry(self.mesh(), geom_name="blob", transform=np.diag([2.0, 2, 2, 1]))
+        scene.add_geometry(self.trimesh.PointCloud(VERTICES), geom_name="cloud")
+        refined = subdivide(scene, 2, SCHEME)
+        blob = refined.geometry["blob"]
+        same_surface(blob.vertices, blob.faces)
+        np.testing.assert_array_equal(refined.geometry["cloud"].vertices, VERTICES)
+        assert len(scene.geometry["blob"].faces) == len(FACES)
+        np.testing.assert_allclose(refined.bounds, scene.bounds, atol=0.5)

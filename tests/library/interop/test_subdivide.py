@@ -38,10 +38,18 @@ def test_the_scheme_is_the_default_model_where_none_is_given():
 
 @pytest.mark.parametrize("mesh", [None, "part.glb", (VERTICES, FACES, FACES), VERTICES])
 def test_other_things_are_refused_with_the_kinds_that_there_are(mesh):
-    with pytest.raises(
-        ParameterError, match=r"trimesh\.Trimesh.*; of a scene or a file, its meshes"
-    ):
+    with pytest.raises(ParameterError, match=r"trimesh\.Trimesh.*pyvista\.MultiBlock"):
         subdivide(mesh)
+
+
+def test_polygons_are_cut_where_that_is_asked_for():
+    square, cut = [[3, 2, 1, 0]], [[3, 2, 1], [3, 1, 0]]
+    expected = refine(Mesh(np.eye(4, 3), cut), SCHEME, 1).mesh
+    vertices, faces = subdivide((np.eye(4, 3), square), 1, SCHEME, triangulate=True)
+    np.testing.assert_array_equal(vertices, expected.vertices)
+    np.testing.assert_array_equal(faces, expected.faces)
+    made = subdivide(Mesh(np.eye(4, 3), square), 1, SCHEME, triangulate=True)
+    np.testing.assert_array_equal(made.vertices, expected.vertices)
 
 
 def test_the_library_imports_none_of_the_others():

@@ -1,0 +1,91 @@
+"""The subdivision matrix: the linear map from control vertices to refined ones.
+
+It traces each refined vertex to the control vertices that it is made of. ``Scheme.matrix`` gives it
+as a sparse array of scipy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Integer
+
+from pns_common.base_scheme import BaseScheme
+from pns_common.kernels import matrix as kernels
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+
+# Colours that go through the masks at once: two columns each.
+TOGETHER = 12
+
+
+@dataclass(frozen=True, eq=False)
+class SubdivisionMatrix:
+    """The map S from control vertices to refined ones, in coordinates: S[rows, columns] = weights.
+
+    The entries are sorted by row, then by column; none is twice. Weights are > 0 and sum to 1 in a
+    row, so the columns of a row are the parents of a refined vertex.
+    """
+
+    rows: Integer[np.ndarray, " N"]
+    columns: Integer[np.ndarray, " N"]
+    weights: Float[np.ndarray, " N"]
+    shape: tuple[int, int]
+
+    @property
+    def starts(self) -> Integer[np.ndarray, " R"]:
+        """Where the entries of each row begin, and after the last row where they end."""
+        return np.searchsorted(self.rows, np.arange(self.shape[0] + 1))
+
+
+def subdivision_matrix(
+    topologies: Sequence[Topology], base: BaseScheme, blocks: Blocks | None = None
+) -> SubdivisionMatrix:
+    """Return S with S @ values = ``columns.refine_columns(values, topologies, base)``, to rounding.
+
+    The masks are read from ``base.place`` itself: from columns of ones at vertices that no row has
+    two of, of which a mesh needs a few more than its largest valence.
+    """
+    blocks = blocks or Blocks()
+    made = _level_matrix(topologies[0], base, blocks)
+    for topology in topologies[1:]:
+        made = _product(_level_matrix(topology, base, blocks), made)
+    return made
+
+
+def _level_matrix(topology: Topology, base: BaseScheme, blocks: Blocks) -> SubdivisionMatrix:
+    """Return S of one level, whose rows read the corners of the faces around one vertex."""
+    count = topology.vertex_count
+    order = np.argsort(topology.corners, kind="stable")
+    starts = np.searchsorted(topology.corners[order], np.arange(count + 1))
+    faces = topology.face_of_corner if len(topology.face_of_corner) else np.arange(len(order)) // 3
+    colour = np.full(count, -1, dtype=np.int64)
+    read = topology.corners, topology.offsets, faces[order], starts
+    colours = kernels.colour_stars(*read, np.full(count + 1, -1, dtype=np.int64), colour)
+    # One column of ones, and one of the vertices' numbers, which tells whose weight it is.
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    named, size = np.arange(1, count + 1, dtype=np.float64), 0
+    for first in range(0, colours, TOGETHER):
+        here = colour[:, None] == np.arange(first, min(first + TOGETHER, colours))
+        placed = base.place(np.hstack([here, here * named[:, None]]), topology, blocks)
+        size, (ones, numbers) = len(placed), np.split(placed, 2, axis=1)
+        rows, which = np.nonzero(ones > 0)
+        weights = ones[rows, which]
+        parts.append((rows, np.rint(numbers[rows, which] / weights).astype(np.int64) - 1, weights))
+    rows, columns, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(rows * count + columns)
+    return SubdivisionMatrix(rows[order], columns[order], weights[order], (size, count))
+
+
+def _product(later: SubdivisionMatrix, earlier: SubdivisionMatrix) -> SubdivisionMatrix:
+    shape = (later.shape[0], earlier.shape[1])
+    most = int(np.diff(earlier.starts)[later.columns].sum())
+    starts, columns = np.empty(shape[0] + 1, dtype=np.int64), np.empty(most, dtype=np.int64)
+    weights = np.empty(most)
+    left = later.starts, later.columns, later.weights
+    right = earlier.starts, earlier.columns, earlier.weights
+    count = kernels.multiply_rows(*left, *right, np.zeros(shape[1]), starts, columns, weights)
+    rows = np.repeat(np.arange(shape[0]), np.diff(starts))
+    return SubdivisionMatrix(rows, columns[:count].copy(), weights[:count].copy(), shape)
