@@ -112,7 +112,7 @@ def test_loop_against_itself_is_one_in_every_term(batch):
 
 
 def test_the_limit_of_loop_on_a_sphere_is_measured_as_it_is():
-    mesh, dense = icosphere(1), icosphere(5)
+    mesh, dense = icosphere(1), icosphere(6)
     pair = Pair("sphere", mesh, Reference(dense.vertices, dense.vertices.copy()))
     one = limit_batch([pair], general(), np.random.default_rng(0))
     limit = refine(mesh, loop(), 2, limit=True).mesh
@@ -120,12 +120,12 @@ def test_the_limit_of_loop_on_a_sphere_is_measured_as_it_is():
     away = 1 - np.linalg.norm(corners.mean(axis=1), axis=1)
     measures = reference_of(one)
     assert measures.mean.item() == pytest.approx(away.mean(), rel=0.05)
-    assert away.mean() < measures.peak.item() < away.max()
+    assert measures.mean.item() < measures.peak.item() < away.max()
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     outwards = corners.mean(axis=1) / np.linalg.norm(corners.mean(axis=1), axis=1, keepdims=True)
     expected = np.linalg.norm(across - outwards, axis=1).mean()
-    assert measures.normal.item() == pytest.approx(expected, rel=0.1)
+    assert measures.normal.item() == pytest.approx(expected, rel=0.15)
 
 
 def test_measures_see_a_shift(batch):

@@ -24,7 +24,7 @@ from train.models.recipe import Recipe
 APART = 16.0
 
 # Faces of the limit from which the surfaces are looked at, and points of these that look back.
-SEEN, SEEN_BACK = 6000, 3000
+SEEN, SEEN_BACK = 4000, 2000
 
 
 @dataclass(frozen=True, eq=False)

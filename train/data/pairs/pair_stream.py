@@ -34,7 +34,7 @@ SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = Mappin
     {machined_pairs: 0.24, solid_pairs: 0.25}
 )
 
-MOST_FACES = 2500
+MOST_FACES = 1200
 
 
 def pair_stream(seed: int) -> Iterator[Pair]:
