@@ -1,8 +1,5 @@
-# The base image; a release gives it by digest: make image BASE=python:3.11-slim-bookworm@sha256:…
-ARG BASE=python:3.11-slim-bookworm
-
 # Build: a virtual environment with nothing that is not pinned by hash; no torch, no compiler.
-FROM ${BASE} AS build
+FROM python:3.13.14-slim-bookworm@sha256:67a1e1f215ccda113cfc024e8639049257e88f273898f595b61476d128d387e8 AS build
 ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
 RUN python3 -m venv /opt/pns && python3 -m venv /opt/build
@@ -13,12 +10,15 @@ COPY pyproject.toml setup.py README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
 # Our own package alone has no hash: it is built here, from these files, by what is pinned above.
+# What is never loaded goes: libraries' tests, and onnxruntime's tools and its library for other languages.
 RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/build/bin/python -m pip wheel --no-build-isolation --no-deps --no-index --wheel-dir /src/dist . \
  && /opt/pns/bin/python -m pip install --no-deps --no-index dist/*.whl \
  && /opt/pns/bin/python -m pip check \
  && /opt/build/bin/cyclonedx-py environment /opt/pns/bin/python --output-reproducible --of JSON -o /opt/pns/sbom.cdx.json \
- && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip
+ && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip \
+ && find /opt/pns/lib -type d \( -name test -o -name tests -o -name transformers \) -prune -exec rm -r {} + \
+ && rm /opt/pns/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.*
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of
@@ -28,7 +28,7 @@ RUN find /opt/pns/lib -path '*pns_common*' -name '*.py' -exec touch --date 2020-
  && /opt/pns/bin/python -m pns_common.warming && /opt/pns/bin/pns doctor
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
-FROM ${BASE}
+FROM python:3.13.14-slim-bookworm@sha256:67a1e1f215ccda113cfc024e8639049257e88f273898f595b61476d128d387e8
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
 # For 1 GiB: at rest three workers take 146 MiB each and the server 55. Bodies and answers are memory

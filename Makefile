@@ -19,7 +19,7 @@ HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: prose size bench bench-answers image hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose size bench bench-answers hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
@@ -103,17 +103,10 @@ SOAK ?= --minutes 10
 soak: $(DEV)/.ready
 	$(DEV)/bin/python -m tests.soak $(SOAK)
 
-# The image of a release: make image BASE=python:3.11-slim-bookworm@sha256:… (docker buildx imagetools
-# inspect python:3.11-slim-bookworm says which). TAG names it.
-TAG ?= pns:latest
-image:
-	@case '$(BASE)' in *@sha256:*) ;; *) echo 'BASE must name the base image by digest: IMAGE@sha256:…' >&2; exit 2;; esac
-	docker build --build-arg BASE='$(BASE)' --tag $(TAG) .
-
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
 PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
 hashes:
-	$(PIP_COMPILE) --extra service --extra store --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PIP_COMPILE) --extra service --extra store --extra tracing --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
 	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
 	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
 
@@ -181,7 +174,7 @@ web: web/node_modules/.ready
 
 # The page in Chromium against a real server; without chromium its tests are skipped, by name.
 web-test: $(DEV)/.ready web/node_modules/.ready
-	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=1 test/*.test.mjs
+	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=2 test/*.test.mjs
 
 # The pictures of README and docs, and how fast the page is on this machine.
 web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready

@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 
 from export.onnx_graph import model_bytes
-from export.parity import TOLERANCE, Parity, check_parity
+from export.parity import TOLERANCE, Parity, check_parity, check_sharpness
 from pns_common.files import replace_file
 from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
 from pns_common.model.file import model_from_bytes
 from train.models.checkpoint import Checkpoint
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,7 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
         checkpoint_card(checkpoint),
         path,
         vertex_network=checkpoint.vertex_network,
+        sharpness_network=checkpoint.sharpness_network,
     )
 
 
@@ -46,11 +47,14 @@ def write_model(
     path: Path,
     tolerance: float = TOLERANCE,
     vertex_network: BoundedNet | None = None,
+    sharpness_network: SharpNet | None = None,
 ) -> Exported:
-    """Write a network, or two, under a card, in one piece; raises as `export_model` does."""
-    data = model_bytes(network, card, vertex_network)
+    """Write networks under a card, in one piece; raises as `export_model` does."""
+    data = model_bytes(network, card, vertex_network, sharpness_network)
     model = model_from_bytes(data, name=path.stem)
     parity = check_parity(model, network, tolerance, vertex_network)
+    if sharpness_network is not None:
+        check_sharpness(model, sharpness_network, tolerance)
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, data)
     return Exported(model.hash, parity)

@@ -8,7 +8,7 @@ from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
 from pns_common.model.card import CARD_KEY, ModelCard
-from train.models.networks import BoundedNet, SymmetricNet
+from train.models.networks import BoundedNet, SharpNet, SymmetricNet
 
 # New enough for every operator here; runtimes of the last years all read it.
 OPSET = 17
@@ -18,11 +18,15 @@ IR_VERSION = 8
 
 
 def model_bytes(
-    network: BoundedNet, card: ModelCard, vertex_network: BoundedNet | None = None
+    network: BoundedNet,
+    card: ModelCard,
+    vertex_network: BoundedNet | None = None,
+    sharpness_network: SharpNet | None = None,
 ) -> bytes:
     """Return the model file: features [edges, K] and budget in, corrections [edges, 3] out.
 
-    With a vertex network also vertex_features [vertices, L] in and vertex_correction out.
+    With a vertex network also vertex_features [vertices, L] in and vertex_correction out; with a
+    sharpness network sharpness_features [edges, P] in, and its sigmoid out, sharpness [edges, 1].
     The projection onto the ball is inside, so ‖correction‖ ≤ budget whatever the weights are.
     Only long-standing standard operators: GELU and SiLU are spelt out. Tied weights are written
     as the dense matrices that they make.
@@ -35,6 +39,13 @@ def model_bytes(
         _add_network(graph, vertex_network, "vertex_features", "vertex_correction")
         inputs.append(_rows("vertex_features", "vertices", vertex_network))
         outputs.append(_answers("vertex_correction", "vertices"))
+    if sharpness_network is not None:
+        graph.prefix = "sharpness_"
+        answer = _perceptron(graph, sharpness_network, "sharpness_features")
+        graph.apply("Sigmoid", answer, output="sharpness")
+        # Rows of a name of their own: those of equal names share buffers, also between networks.
+        inputs.append(_rows("sharpness_features", "sharpened", sharpness_network))
+        outputs.append(_answers("sharpness", "sharpened", 1))
     return _serialise(graph, inputs, outputs, card)
 
 
@@ -72,8 +83,8 @@ def _add_network(graph: _Graph, network: BoundedNet, features: str, output: str)
     _project_onto_ball(graph, perceptron(graph, network, features), output)
 
 
-def _perceptron(graph: _Graph, network: BoundedNet, value: str) -> str:
-    """Add the layers and return z."""
+def _perceptron(graph: _Graph, network: BoundedNet | SharpNet, value: str) -> str:
+    """Add the layers and return what the last one makes."""
     for index, layer in enumerate(network.linear_layers):
         value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
     return value
@@ -104,7 +115,7 @@ def _symmetric_perceptron(graph: _Graph, network: BoundedNet, features: str) -> 
 
 def _layer(
     graph: _Graph,
-    network: BoundedNet,
+    network: BoundedNet | SharpNet,
     index: int,
     value: str,
     weight: np.ndarray,
@@ -153,13 +164,13 @@ def _project_onto_ball(graph: _Graph, z: str, output: str) -> None:
     graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output=output)
 
 
-def _rows(name: str, rows: str, network: BoundedNet) -> ValueInfoProto:
+def _rows(name: str, rows: str, network: BoundedNet | SharpNet) -> ValueInfoProto:
     width = network.linear_layers[0].in_features
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, width])
 
 
-def _answers(name: str, rows: str) -> ValueInfoProto:
-    return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, 3])
+def _answers(name: str, rows: str, columns: int = 3) -> ValueInfoProto:
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, columns])
 
 
 def _serialise(

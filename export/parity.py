@@ -11,7 +11,7 @@ from jaxtyping import Float
 from pns_common.errors import ModelError, PnsError
 from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, Feature
 from pns_common.model.session import OnnxModel
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 
 # Largest difference allowed, as a fraction of the budget and of the row's largest feature.
 #
@@ -76,6 +76,23 @@ def check_parity(
     seen = RING_FEATURE_SETS[model.card.vertex_features].features
     vertices = _compare(model.vertex_correction, vertex_network, seen, tolerance)
     return Parity(max(edges.difference, vertices.difference), max(edges.length, vertices.length))
+
+
+def check_sharpness(model: OnnxModel, network: SharpNet, tolerance: float = TOLERANCE) -> None:
+    """Compare a file's sharpness network with the torch network in float64.
+
+    Raises:
+        ParityError: they differ by more than `tolerance`.
+        ModelError: the file has no sharpness network.
+    """
+    features = sample_features(network.linear_layers[0].in_features)
+    size = np.maximum(np.abs(features).max(axis=1, keepdims=True), 1)
+    with torch.no_grad():
+        expected = copy.deepcopy(network).double()(torch.from_numpy(features).double()).sigmoid()
+    difference = float((np.abs(model.sharpness(features) - expected.numpy()) / size).max())
+    # Written so that NaN fails it too.
+    if not difference <= tolerance:
+        raise ParityError(budget=1.0, difference=difference, tolerance=tolerance)
 
 
 def _compare(

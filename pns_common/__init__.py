@@ -26,13 +26,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pns_common.creases import Creases, sharp_edges
+    from pns_common.creases import Creases
     from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
     from pns_common.interop.subdivide import subdivide
     from pns_common.mesh import Mesh, clean
     from pns_common.model.file import load_model
     from pns_common.refinement import Refinement, refine, refine_many
     from pns_common.schemes import Scheme, catmull_clark, loop, pns
+    from pns_common.sharpness import sharp_edges
     from pns_common.version import VERSION as __version__  # noqa: N811
     from pns_common.warming import warm_up
 
@@ -52,7 +53,7 @@ _HOMES = {
     "pns": "schemes",
     "refine": "refinement",
     "refine_many": "refinement",
-    "sharp_edges": "creases",
+    "sharp_edges": "sharpness",
     "subdivide": "interop.subdivide",
     "warm_up": "warming",
 }

@@ -48,7 +48,7 @@ def level_topologies(
     if not (topologies[0].triangles or base.polygons):
         raise MeshError("polygons, expected triangles", element="faces")
     if creases.named is not None and creases.sharp_at(0):
-        topologies[0] = topologies[0].with_creases(topologies[0].rows_of(creases.named))
+        topologies[0] = creases.applied_by_name(topologies[0])
     for depth in range(1, levels):
         topologies.append(base.split(topologies[-1], blocks, inherit=creases.sharp_at(depth)))
     return topologies[:levels]

@@ -1,4 +1,4 @@
-"""Edges that stay sharp: named by the caller, or found by their angle."""
+"""Edges that stay sharp: named by the caller, or found by their angle or by a network."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
 from pns_common.kernels import measures
-from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.normals import measure_faces
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import Topology
+from pns_common.topology import MOSTLY_SHARP, Topology
 
 # ``crease=auto``: edges that turn by more than ANGLE degrees and are connected, by such edges, to
 # one that turns by more than SEED.
@@ -28,26 +27,32 @@ class Creases:
 
     Attributes:
         named: (N, 2) pairs of vertices; None for none.
+        sharpness: (N,) sharpness of these, 0 … 1; None: 1.
         angle: find edges that turn by more than this, in degrees; None: find none.
         seed: of these, keep those that are connected by such edges to one that turns by more than
             this, in degrees; None: keep all.
+        learned: ask the sharpness network of the scheme's model.
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
             limits.
 
     Raises:
-        ParameterError: pairs that are no pairs of whole numbers, an angle outside 0 … 180, a seed
-            below the angle, or levels below 1.
+        ParameterError: pairs that are no pairs of whole numbers, sharpness that is not one number
+            from 0 to 1 a pair, an angle outside 0 … 180, a seed below the angle, or levels below 1.
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
+    sharpness: Float[np.ndarray, " N"] | None = None
     angle: float | None = None
     seed: float | None = None
+    learned: bool = False
     levels: int | None = None
 
     def __post_init__(self) -> None:
         if self.named is not None:
             object.__setattr__(self, "named", as_pairs(self.named))
+        if self.sharpness is not None:
+            _check_sharpness(self.sharpness, 0 if self.named is None else len(self.named))
         angle, seed, levels = self.angle, self.seed, self.levels
         if angle is not None and not (is_number(angle) and 0 < angle < HALF_TURN):
             raise ParameterError("angle", angle, expected="degrees between 0 and 180")
@@ -57,11 +62,27 @@ class Creases:
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
-        """Return a copy with further pairs of vertices named."""
+        """Return a copy with further pairs of vertices named, of sharpness 1."""
         if len(pairs) == 0:
             return self
-        named = pairs if self.named is None else np.concatenate([pairs, self.named])
-        return replace(self, named=named)
+        if self.named is None:
+            return replace(self, named=pairs)
+        sharpness = self.sharpness
+        if sharpness is not None:
+            sharpness = np.concatenate([np.ones(len(pairs)), sharpness])
+        return replace(self, named=np.concatenate([pairs, self.named]), sharpness=sharpness)
+
+    @property
+    def finds(self) -> bool:
+        """Tell whether edges are found by their shape."""
+        return self.learned or self.angle is not None
+
+    @property
+    def sharp_pairs(self) -> Integer[np.ndarray, "N 2"] | None:
+        """The named edges that count as sharp: those of sharpness above ½."""
+        if self.named is None or self.sharpness is None:
+            return self.named
+        return self.named[self.sharpness > MOSTLY_SHARP]
 
     def sharp_at(self, depth: int) -> bool:
         """Return whether the edges are sharp at a level; level 0 refines the control mesh."""
@@ -74,7 +95,7 @@ class Creases:
         normals: Float[np.ndarray, "F 3"] | None = None,
         blocks: Blocks | None = None,
     ) -> Topology:
-        """Return the topology with these edges as creases.
+        """Return the topology with the edges that are named or found by their angle.
 
         Args:
             points, topology: the mesh.
@@ -84,11 +105,25 @@ class Creases:
         Raises:
             ParameterError: a named pair is no edge of the mesh.
         """
-        if self.named is not None and len(self.named):
-            topology = topology.with_creases(topology.rows_of(self.named))
+        topology = self.applied_by_name(topology)
         if self.angle is not None:
             topology = topology.with_creases(self.found(points, topology, normals, blocks))
         return topology
+
+    def applied_by_name(self, topology: Topology) -> Topology:
+        """Return the topology with the edges that are named.
+
+        Raises:
+            ParameterError: a named pair is no edge of the mesh.
+        """
+        if self.named is None or len(self.named) == 0:
+            return topology
+        rows = topology.rows_of(self.named)
+        if self.sharpness is None:
+            return topology.with_creases(rows)
+        sharpness = np.zeros(len(topology.edges))
+        np.maximum.at(sharpness, rows, self.sharpness)
+        return topology.with_sharpness(sharpness)
 
     def found(
         self,
@@ -110,23 +145,6 @@ class Creases:
 
 AUTOMATIC = Creases(angle=ANGLE, seed=SEED)
 NO_CREASES = Creases()
-
-
-def sharp_edges(mesh: Mesh, angle: float | None = None) -> Integer[np.ndarray, "N 2"]:
-    """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
-
-    Args:
-        mesh: a mesh of any polygons.
-        angle: edges that turn by more than so many degrees. None: those that turn by more than 40
-            and are connected by such edges to one that turns by more than 60.
-
-    Raises:
-        ParameterError: it is no Mesh, or the angle is out of range.
-    """
-    check_is_mesh(mesh)
-    creases = AUTOMATIC if angle is None else Creases(angle=angle)
-    topology = mesh.topology()
-    return topology.edges[creases.found(mesh.vertices, topology)].astype(np.int64)
 
 
 def chosen_creases(
@@ -212,6 +230,17 @@ def as_pairs(creases: Any) -> Integer[np.ndarray, "N 2"]:
         row = int(huge[0])
         raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected="two vertices")
     return pairs.astype(np.int64)
+
+
+def _check_sharpness(given: Any, count: int) -> None:
+    """Check that there is a number from 0 to 1 for each named edge. Raises ParameterError."""
+    values = np.asarray(given)
+    expected = "a number from 0 to 1 for each named edge"
+    if values.shape != (count,) or values.dtype.kind not in "fiu":
+        raise ParameterError("sharpness", f"{values.dtype} {values.shape}", expected=expected)
+    wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
+    if len(wrong):
+        raise ParameterError(f"sharpness[{wrong[0]}]", values[wrong[0]], expected=expected)
 
 
 def _is_pair(row: Any) -> bool:

@@ -66,8 +66,12 @@ class Level:
         """Return the level with some edges kept sharp, and what is known of its faces."""
         normals = None if creases.angle is None else self.normals
         quiet = self.blocks.quiet()
-        made = replace(self, topology=creases.applied(self.points, self.topology, normals, quiet))
-        if normals is not None:
+        return self.with_topology(creases.applied(self.points, self.topology, normals, quiet))
+
+    def with_topology(self, topology: Topology) -> Level:
+        """Return the level with other sharpness, and what is known of its faces."""
+        made = replace(self, topology=topology)
+        if "faces" in vars(self):
             vars(made)["faces"] = self.faces
         return made
 

@@ -34,6 +34,7 @@ from pns_common.report import (
     longest,
 )
 from pns_common.schemes import NAMES, Scheme, named_scheme
+from pns_common.sharpness import with_sharp_edges
 from pns_common.topology import TRIANGLE, Topology
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
@@ -150,9 +151,10 @@ def refine(
         limit: put the last level's vertices where the base scheme would take them if it were
             applied for ever, and return the limit surface's normals there.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
-            1994). "auto": for a model of format 4 the edges that turn by more than 40 degrees and
-            are connected by such edges to one that turns by more than 60, at as many levels as its
-            card says; none for other schemes. None: no edge.
+            1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
+            as sharp as the sharpness network finds it; for a model of format 4 without one, the
+            edges that turn by more than 40 degrees and are connected by such edges to one that
+            turns by more than 60; none for other schemes. None: no edge.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -176,7 +178,7 @@ def refine(
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
 
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
-    level, steps = level.with_creases(kept), list[Step]()
+    level, steps = with_sharp_edges(level, kept, scheme), list[Step]()
     for depth in range(count):
         if steps:
             topology = scheme.base.split(level.topology, blocks, inherit=kept.sharp_at(depth))
@@ -249,7 +251,7 @@ def control_level(
     kept = chosen_creases(creases, scheme.creases)
     length = _reference_length(mesh, reference_length, measured=True)
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
-    return level.with_creases(kept)
+    return with_sharp_edges(level, kept, scheme)
 
 
 def refine_many(

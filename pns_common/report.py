@@ -14,19 +14,23 @@ from pns_common.kernels import children, connectivity
 from pns_common.kernels import quads as of_quads
 from pns_common.operator import Additions
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.topology import EdgeClass, Topology
 
 # A gate above this counts as active.
 GATE_ACTIVE = 0.01
 
 
 class EdgeCounts(TypedDict):
-    """The edges that a level refined, by class; ``crease`` only where there are some."""
+    """The edges that a level refined, by class; ``crease`` and ``soft`` only where there are some.
+
+    ``soft`` counts the interior edges of sharpness above ½.
+    """
 
     interior: int
     boundary: int
     irregular: int
     crease: NotRequired[int]
+    soft: NotRequired[int]
 
 
 class RatioSummary(TypedDict):
@@ -64,8 +68,9 @@ class Distances(TypedDict):
 class LevelReport(Distances):
     """One level: counts of the mesh that it made, and diagnostics of the step that made it.
 
-    ``proximity_ratio``, ``gate`` and ``normal_jump_max`` (the largest angle in radians between the
-    children beside an edge) are those of interior edges, not of creases. ``vertex_rule`` exists
+    ``proximity_ratio`` and ``gate`` are those of interior edges, not of creases;
+    ``normal_jump_max``, the largest angle in radians between the children beside an edge, leaves
+    edges of sharpness above ½ out as well. ``vertex_rule`` exists
     where the model moves old vertices. Learned levels alone have ``displacement_max``, the longest
     δ, and ``envelope_max``, the longest that the budget allows where a gate is open, both in the
     mesh's units; ``shut``, the number of interior edges and movable vertices whose gate is 0; and,
@@ -139,7 +144,10 @@ def child_angles(
         quads: whether each corner became a quad; else each triangle four.
     """
     normals = _child_normals(parent, points, blocks, quads)
-    of_mesh = parent.half_edges, parent.edge_class
+    smooth_class = parent.edge_class
+    if len(parent.soft):
+        smooth_class = np.where(parent.is_sharp, EdgeClass.CREASE, smooth_class).astype(np.int8)
+    of_mesh = parent.half_edges, smooth_class
     if quads:
         corners = parent.offsets, parent.face_of_corner
         inside = blocks.run(
@@ -212,7 +220,7 @@ def level_report(
     report: LevelReport = {
         "vertices": count + len(parent.edges) + (parent.face_count if quads else 0),
         "faces": len(parent.corners) if quads else 4 * parent.face_count,
-        "edges": edge_counts(parent.edge_class),
+        "edges": edge_counts(parent),
         "degenerate_frames": 0 if added is None else added.degenerate,
         "flipped_faces": angles.flipped,
         "proximity_ratio": _ratio_summary(ratio),
@@ -262,9 +270,9 @@ def longest(displacement: Float[np.ndarray, "W 3"]) -> float:
     return math.sqrt(float(squares.max(initial=0)))
 
 
-def edge_counts(edge_class: Integer[np.ndarray, " E"]) -> EdgeCounts:
+def edge_counts(mesh: Topology) -> EdgeCounts:
     """Count the edges of each class."""
-    count = np.bincount(edge_class, minlength=4).tolist()
+    count = np.bincount(mesh.edge_class, minlength=4).tolist()
     counts: EdgeCounts = {
         "interior": count[connectivity.INTERIOR],
         "boundary": count[connectivity.BOUNDARY],
@@ -272,6 +280,8 @@ def edge_counts(edge_class: Integer[np.ndarray, " E"]) -> EdgeCounts:
     }
     if count[connectivity.CREASE]:
         counts["crease"] = count[connectivity.CREASE]
+    if soft := int(np.count_nonzero(mesh.is_sharp)) - count[connectivity.CREASE]:
+        counts["soft"] = soft
     return counts
 
 

@@ -18,9 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Integer
 
+from pns_common.creases import AUTOMATIC, Creases
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
+from pns_common.mesh import Mesh, check_is_mesh
+from pns_common.normals import measure_faces
 from pns_common.operator import NETWORK_ROWS, Rule, checked_answers
+from pns_common.parallel import Blocks
+from pns_common.schemes import Scheme, loop
 from pns_common.topology import Topology
 
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
@@ -118,8 +123,9 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
 def turned_edges(level: Level) -> TurnedEdges:
     """Measure a mesh, as if it had no marks."""
     mesh, blocks = level.topology.without_creases(), level.blocks.quiet()
-    unmarked = Level(level.points, mesh, level.base, None, blocks)
-    areas, measured = unmarked.faces[1][:, 3].copy(), unmarked.edges
+    areas, measured = level.faces[1], level.with_topology(mesh).edges
+    if len(areas) < mesh.face_count:  # not kept
+        _, areas = measure_faces(level.points, mesh, blocks, areas=True)
     turns = np.empty(len(mesh.edges))
     blocks.run(
         len(turns),
@@ -138,7 +144,7 @@ def turned_edges(level: Level) -> TurnedEdges:
         measured.lengths,
         measured.jumps,
         turns,
-        areas,
+        np.ascontiguousarray(areas[:, 3]),
         columns,
         starts,
         spokes,
@@ -159,3 +165,60 @@ def _whole(
 
 def _mean(values: Float[np.ndarray, " N"]) -> float:
     return float(values.mean()) if len(values) else 0.0
+
+
+# --- for whole meshes -----------------------------------------------------------------------------
+
+
+def with_sharp_edges(level: Level, creases: Creases, scheme: Scheme) -> Level:
+    """Return a level with the edges that are named, and those that are found.
+
+    Raises:
+        ParameterError: a named pair is no edge of the mesh.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    level = level.with_creases(creases)
+    if not (creases.learned and scheme.rule):
+        return level
+    made = level.topology.with_sharpness(learned_sharpness(level, scheme.rule))
+    return level.with_topology(made)
+
+
+def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
+    """Return the creases that are named or found, all by name.
+
+    Raises:
+        ParameterError: a named pair is no edge of the mesh.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    level = Level(mesh.vertices, mesh.topology(), scheme.base, None, Blocks())
+    topology = with_sharp_edges(level, creases, scheme).topology
+    found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
+    sharpness = topology.sharpness[found] if len(topology.soft) else None
+    return Creases(topology.edges[found].astype(np.int64), sharpness, levels=creases.levels)
+
+
+def sharp_edges(
+    mesh: Mesh, angle: float | None = None, scheme: Scheme | None = None
+) -> Integer[np.ndarray, "N 2"]:
+    """Return the edges of a mesh that its shape shows to be sharp, as pairs of vertices.
+
+    Args:
+        mesh: a mesh of any polygons.
+        angle: edges that turn by more than so many degrees.
+        scheme: without an angle: edges to which ``creases="auto"`` of this scheme gives a sharpness
+            above ½. None: those that turn by more than 40 degrees and are connected by such edges
+            to one that turns by more than 60.
+
+    Raises:
+        ParameterError: it is no Mesh, or the angle is out of range.
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    check_is_mesh(mesh)
+    creases = AUTOMATIC if scheme is None else scheme.creases
+    named = creases_by_name(
+        mesh, creases if angle is None else Creases(angle=angle), scheme or loop()
+    )
+    pairs = named.sharp_pairs
+    assert pairs is not None
+    return pairs

@@ -22,6 +22,8 @@ from pns_common.parallel import Blocks
 STEPS = 32
 TRIANGLE = 3
 NO_WEIGHTS = np.zeros(0)
+# Edges of a sharpness above this count as sharp where there is only yes and no.
+MOSTLY_SHARP = 1 / 2
 NO_FACES = np.zeros(0, dtype=np.uint32)
 
 
@@ -143,6 +145,12 @@ class Topology:
             return np.where(self.edge_class == kernels.INTERIOR, self.soft, 1.0)
         return (self.edge_class != kernels.INTERIOR).astype(np.float64)
 
+    @property
+    def is_sharp(self) -> Bool[np.ndarray, " E"]:
+        """Flags of creases, and of interior edges of sharpness above ½."""
+        creases = self.edge_class == kernels.CREASE
+        return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
+
     @cached_property
     def sharpest(self) -> SharpVertices | None:
         """The vertices on sharp and soft edges; None where all edges are interior and smooth."""
@@ -204,9 +212,14 @@ class Topology:
         return replace(self, edge_class=classes)
 
     def with_sharpness(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
-        """Return a copy with sharpness w of interior edges; those of w = 1 are creases."""
+        """Return a copy with sharpness w of interior edges, where they have less.
+
+        Those of w = 1 are creases.
+        """
         made = self.with_creases(np.flatnonzero(sharpness >= 1))
         soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
+        if len(self.soft):
+            soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
         return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
 
     def without_creases(self) -> Topology:

@@ -12,7 +12,7 @@ from jaxtyping import Int
 from pns_common.creases import Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.report import LevelReport
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.topology import build_topology
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
@@ -45,7 +45,7 @@ def count_bends(
         return [NO_BENDS] * parts
     topology = build_topology(mesh.faces, len(mesh.vertices))
     bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
-    sharp = creases.applied(mesh.vertices, topology).edge_class[bent] == EdgeClass.CREASE
+    sharp = creases.applied_by_name(topology).is_sharp[bent]
     part = np.zeros(len(bent), dtype=np.int64)
     if part_of_face is not None:
         part = part_of_face[topology.half_edges[bent, 0] // 3]
@@ -58,9 +58,8 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     if not levels:
         return []
     edges = levels[0]["edges"]
-    total = sum(edges[kind] for kind in ("interior", "boundary", "irregular")) + edges.get(
-        "crease", 0
-    )
+    creases = edges.get("crease", 0)
+    total = creases + sum(edges[kind] for kind in ("interior", "boundary", "irregular"))
     if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
         return [
             f"{bends.sharp} of {bends.bent} bent edges are kept sharp: "
@@ -71,6 +70,6 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
             f"{edges['boundary']} of {total} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
         ]
-    if levels[-1]["normal_jump_max"] < BENT and not edges.get("crease"):
+    if levels[-1]["normal_jump_max"] < BENT and not creases and not edges.get("soft"):
         return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
     return []

@@ -57,6 +57,7 @@ def print_model(model: OnnxModel) -> None:
         "budget C": card.budget,
         "orientation": card.orientation,
         **_further_rows(card),
+        "runs on": ", ".join(model.providers),
         "bytes": model.size,
         "sha256": model.hash,
     }
@@ -78,6 +79,7 @@ def _further_rows(card: ModelCard) -> dict[str, Any]:
         "network scale τ": card.network_scale,
         "fold angle θ": card.fold_angle,
         "sharpness levels": card.sharpness_levels,
+        "sharpness features": card.sharpness_features,
     }
     return {name: value for name, value in rows.items() if value is not None}
 

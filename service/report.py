@@ -101,6 +101,7 @@ def total_level(levels: Sequence[LevelReport]) -> LevelReport:
     """
     weights = [level["edges"]["interior"] for level in levels]
     creases = sum(level["edges"].get("crease", 0) for level in levels)
+    soft = sum(level["edges"].get("soft", 0) for level in levels)
     edges: EdgeCounts = {
         "interior": sum(weights),
         "boundary": sum(level["edges"]["boundary"] for level in levels),
@@ -108,6 +109,8 @@ def total_level(levels: Sequence[LevelReport]) -> LevelReport:
     }
     if creases:
         edges["crease"] = creases
+    if soft:
+        edges["soft"] = soft
     total: LevelReport = {
         "vertices": sum(level["vertices"] for level in levels),
         "faces": sum(level["faces"] for level in levels),

@@ -69,6 +69,7 @@ Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]
 Hosts = Annotated[
     tuple[Annotated[str, BeforeValidator(_host)], ...], NoDecode, BeforeValidator(_listed)
 ]
+Words = Annotated[tuple[Name, ...], Field(min_length=1), NoDecode, BeforeValidator(_listed)]
 Origins = Annotated[
     tuple[Annotated[str, BeforeValidator(_origin)], ...], NoDecode, BeforeValidator(_listed)
 ]

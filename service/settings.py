@@ -9,7 +9,7 @@ from pydantic import ByteSize, Field, TypeAdapter, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
-from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size
+from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size, Words
 
 MIB = 1024**2
 PREFIX = "PNS_"
@@ -81,6 +81,10 @@ class Settings(BaseSettings):
     )
     model: Name | None = Field(
         default=None, description="bundled name or model file; none: the default bundled one"
+    )
+    providers: Words = Field(
+        default=("CPUExecutionProvider",),
+        description="execution providers of onnxruntime for every model, preferred first",
     )
 
     body: Size = Field(default=ByteSize(64 * MIB), description="largest request body")

@@ -1,8 +1,8 @@
 """The model card: what a model file says of itself, as JSON in its metadata.
 
 Format 1 is the paper's operator: one network for edges, at every level. Format 4 is the default's:
-networks for edges and for old vertices, a prior and a fold guard, at level 0 alone. Formats 2 and 3
-were never released.
+networks for edges and for old vertices, a prior and a fold guard, at level 0 alone; a third network
+may say how sharp edges are. Formats 2 and 3 were never released.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ RETIRED_FORMATS = (2, 3)
 # How many columns each feature set has.
 EDGE_FEATURES: Mapping[str, int] = MappingProxyType({"paper-5": 5, "signed-18": 18})
 VERTEX_FEATURES: Mapping[str, int] = MappingProxyType({"ring-10": 10})
+SHARPNESS_FEATURES: Mapping[str, int] = MappingProxyType({"crease-53": 53})
 ORIENTATIONS = ("first-face", "symmetric")
 BASES = ("loop", "catmull-clark")
 # A prior of strength 1 is full quasi-interpolation; far beyond it squares leave the floats.
@@ -49,6 +50,8 @@ class ModelCard:
         network_scale: τ, the longest vector that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard, between 0 and 90 degrees.
         sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
+        sharpness_features: Name of the feature set that the sharpness network reads; None: there is
+            none.
     """
 
     format: int
@@ -66,6 +69,7 @@ class ModelCard:
     network_scale: float | None = None
     fold_angle: float | None = None
     sharpness_levels: int | None = None
+    sharpness_features: str | None = None
 
     def to_json(self) -> str:
         """Return the card as JSON, keys in the order of the attributes, without fields of None."""
@@ -93,6 +97,7 @@ class ModelCard:
 
 
 FORMAT_4_FIELDS = tuple(field.name for field in fields(ModelCard) if field.default is None)
+OPTIONAL_FIELDS = frozenset({"sharpness_features"})
 
 Range = tuple[Callable[[Any], bool], str]
 
@@ -123,6 +128,7 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
             lambda value: 0 <= value <= MOST_SHARPNESS_LEVELS,
             f"from 0 to {MOST_SHARPNESS_LEVELS}",
         ),
+        "sharpness_features": _one_of(SHARPNESS_FEATURES),
     }
 )
 
@@ -188,6 +194,8 @@ def _kinds(hint: Any) -> tuple[Any, ...]:
 def _check_fields_of_format(card: ModelCard) -> None:
     """Check that the fields of format 4 stand there and only there. Raises ValueError."""
     for name in FORMAT_4_FIELDS:
-        if (getattr(card, name) is None) == (card.format == DEFAULT_FORMAT):
-            problem = "missing" if card.format == DEFAULT_FORMAT else "unknown"
-            raise ValueError(f"{problem} field {name} in format {card.format}")
+        given = getattr(card, name) is not None
+        if given and card.format != DEFAULT_FORMAT:
+            raise ValueError(f"unknown field {name} in format {card.format}")
+        if not given and card.format == DEFAULT_FORMAT and name not in OPTIONAL_FIELDS:
+            raise ValueError(f"missing field {name} in format {card.format}")

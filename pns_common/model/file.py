@@ -2,9 +2,10 @@
 
 A file is one ONNX graph of at most ``LARGEST_FILE`` bytes: standard operators from an allow-list,
 no data outside it, the card under the metadata key ``pns_card``. Inputs are ``budget`` (a float32
-scalar) and ``features`` [edges, K], in format 4 also ``vertex_features`` [vertices, L]; outputs are
-``correction`` [edges, 3] and ``vertex_correction`` [vertices, 3]. Hidden tensors of one call fill
-at most ``LARGEST_CALL`` bytes.
+scalar) and ``features`` [edges, K], in format 4 also ``vertex_features`` [vertices, L] and, where
+the card names them, ``sharpness_features`` [edges, P]; outputs are ``correction`` [edges, 3],
+``vertex_correction`` [vertices, 3] and ``sharpness`` [edges, 1]. Hidden tensors of one call fill at
+most ``LARGEST_CALL`` bytes.
 
 The hashes of the bundled files stand in ``models/SHA256SUMS``: ``sha256sum -c`` reads it.
 """

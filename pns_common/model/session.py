@@ -16,7 +16,13 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError, ParameterError
-from pns_common.model.card import CARD_KEY, EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+from pns_common.model.card import (
+    CARD_KEY,
+    EDGE_FEATURES,
+    SHARPNESS_FEATURES,
+    VERTEX_FEATURES,
+    ModelCard,
+)
 
 # Rows of one call of onnxruntime. 1,024 take a fifth longer a row, 8,192 and 16,384 as long.
 CHUNK_ROWS = 4096
@@ -27,7 +33,7 @@ CPU = ("CPUExecutionProvider",)
 
 @runtime_checkable
 class Model(Protocol):
-    """Networks with a card; every answer is a vector of norm ≤ budget."""
+    """Networks with a card; every correction is a vector of norm ≤ budget."""
 
     @property
     def card(self) -> ModelCard:
@@ -52,6 +58,10 @@ class Model(Protocol):
         """Return the weights of the ring vectors of old vertices, (N, 3); format 4 alone."""
         ...
 
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
+        """Return the sharpness of edges, (N, 1); where the card names features for it alone."""
+        ...
+
 
 @dataclass(frozen=True)
 class Network:
@@ -65,11 +75,14 @@ class Network:
 
 def networks(card: ModelCard) -> tuple[Network, ...]:
     """Return the networks that a file with this card holds."""
-    edges = Network("features", EDGE_FEATURES[card.features], "correction", 3)
-    if card.vertex_features is None:
-        return (edges,)
-    columns = VERTEX_FEATURES[card.vertex_features]
-    return edges, Network("vertex_features", columns, "vertex_correction", 3)
+    held = [Network("features", EDGE_FEATURES[card.features], "correction", 3)]
+    if card.vertex_features is not None:
+        columns = VERTEX_FEATURES[card.vertex_features]
+        held.append(Network("vertex_features", columns, "vertex_correction", 3))
+    if card.sharpness_features is not None:
+        columns = SHARPNESS_FEATURES[card.sharpness_features]
+        held.append(Network("sharpness_features", columns, "sharpness", 1))
+    return tuple(held)
 
 
 class OnnxModel:
@@ -138,6 +151,16 @@ class OnnxModel:
                 finite or of another shape.
         """
         return self._answers("vertex_features", features, budget)
+
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float32[np.ndarray, "N 1"]:
+        """Return the sharpness of edges.
+
+        Raises:
+            ParameterError: features of another shape.
+            ModelError: the model has no sharpness network, the graph fails, or an answer is not
+                finite or of another shape.
+        """
+        return self._answers("sharpness_features", features, 1.0)
 
     def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
         network = self._networks.get(given)

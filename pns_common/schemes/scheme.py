@@ -157,9 +157,12 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         network_scale=_given(model, "network_scale"),
         fold_angle=_given(model, "fold_angle"),
     )
-    creases = NO_CREASES
+    creases, is_learned = NO_CREASES, card.sharpness_features is not None
+    if is_learned:
+        learned = replace(learned, sharpness_network=partial(_sharpness, model))
     if budget > 0 and card.sharpness_levels:
-        creases = Creases(angle=ANGLE, seed=SEED, levels=card.sharpness_levels)
+        creases = Creases(learned=True) if is_learned else Creases(angle=ANGLE, seed=SEED)
+        creases = replace(creases, levels=card.sharpness_levels)
     return Scheme(
         "pns",
         BASES[card.base],
@@ -192,3 +195,7 @@ def _vertices_at_unit_budget(
     model: Model, features: Float[np.ndarray, "N K"]
 ) -> Float[np.ndarray, "N 3"]:
     return model.vertex_correction(features, 1.0)
+
+
+def _sharpness(model: Model, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
+    return model.sharpness(features)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import partial
 
+from python_multipart import FormParser
 from python_multipart.exceptions import FormParserError
-from python_multipart.multipart import MultipartParser, parse_options_header
+from python_multipart.multipart import Field, parse_options_header
+from python_multipart.multipart import File as SentFile
 
 from ..errors import ServiceError, UnreadableError, check_limit
 from .sibling_files import File, SiblingFiles, relative_name
 
-# A part has three or four short headers; a megabyte of them is an attack.
-MAX_HEADER_BYTES = 16 * 1024
 MAX_PARTS = 256
 MAIN = "file"
 
@@ -26,66 +26,11 @@ class MultipartError(ServiceError):
     title = "The multipart body must have one part named file, and others with names of their own"
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Part:
-    headers: dict[bytes, bytes] = field(default_factory=dict)
-    data: bytearray = field(default_factory=bytearray)
-    name: str = ""
-    filename: str = ""
-
-
-class _Parts:
-    """Collects the parts."""
-
-    def __init__(self) -> None:
-        self.parts: list[_Part] = []
-        self.finished = False
-        self._field = bytearray()
-        self._value = bytearray()
-        self._header_bytes = 0
-
-    def callbacks(self) -> Any:
-        return {
-            "on_part_begin": self._part_begin,
-            "on_header_field": lambda data, start, end: self._header(self._field, data[start:end]),
-            "on_header_value": lambda data, start, end: self._header(self._value, data[start:end]),
-            "on_header_end": self._header_end,
-            "on_headers_finished": self._headers_finished,
-            "on_part_data": self._part_data,
-            "on_end": self._end,
-        }
-
-    def _part_begin(self) -> None:
-        count = len(self.parts) + 1
-        check_limit("parts", count, MAX_PARTS, f"the body has {count} parts or more")
-        self.parts.append(_Part())
-        self._header_bytes = 0
-
-    def _header(self, target: bytearray, piece: bytes) -> None:
-        self._header_bytes += len(piece)
-        if self._header_bytes > MAX_HEADER_BYTES:
-            raise UnreadableError("the part's headers are too long")
-        target += piece
-
-    def _header_end(self) -> None:
-        self.parts[-1].headers[bytes(self._field).lower()] = bytes(self._value)
-        self._field.clear()
-        self._value.clear()
-
-    def _headers_finished(self) -> None:
-        part = self.parts[-1]
-        _, options = parse_options_header(part.headers.get(b"content-disposition", b""))
-        part.name, part.filename = (
-            options.get(key, b"").decode(errors="replace") for key in (b"name", b"filename")
-        )
-        if not part.name:
-            raise MultipartError("a part has no name")
-
-    def _part_data(self, data: bytes, start: int, end: int) -> None:
-        self.parts[-1].data += memoryview(data)[start:end]
-
-    def _end(self) -> None:
-        self.finished = True
+    name: str
+    filename: str
+    content: bytes
 
 
 @dataclass(frozen=True)
@@ -112,33 +57,56 @@ def sent_files(body: bytes, content_type: str) -> SentFiles:
     if len(main) != 1:
         raise MultipartError(f"{len(main)} parts have the name {MAIN}, not one")
     others = [part for part in parts if part.name != MAIN]
-    return SentFiles(File(main[0].filename, bytes(main[0].data)), _siblings(others))
+    return SentFiles(File(main[0].filename, main[0].content), _siblings(others))
 
 
 def _parsed(body: bytes, content_type: str) -> list[_Part]:
     boundary = parse_options_header(content_type)[1].get(b"boundary")
     if not boundary:
         raise UnreadableError("the Content-Type names no multipart boundary")
-    collected = _Parts()
+    parts: list[_Part] = []
+    ends: list[bool] = []
+    take = partial(_take, parts)
     try:
-        parser = MultipartParser(boundary, collected.callbacks())
+        # Its own limits bound the headers of a part.
+        parser = FormParser(
+            "multipart/form-data",
+            on_field=take,
+            on_file=take,
+            on_end=lambda: ends.append(True),
+            boundary=boundary,
+            config={"MAX_MEMORY_FILE_SIZE": float("inf")},
+        )
         parser.write(body)
         parser.finalize()
     except FormParserError as error:
         raise UnreadableError(f"the multipart body cannot be read: {error}") from error
-    if collected.parts and not collected.finished:
+    if body and not ends:
         raise UnreadableError("the multipart body ends before its closing boundary")
-    return collected.parts
+    return parts
+
+
+def _take(parts: list[_Part], sent: Field | SentFile) -> None:
+    count = len(parts) + 1
+    check_limit("parts", count, MAX_PARTS, f"the body has {count} parts or more")
+    name = (sent.field_name or b"").decode(errors="replace")
+    if not name:
+        raise MultipartError("a part has no name")
+    if isinstance(sent, Field):
+        parts.append(_Part(name, "", sent.value or b""))
+    else:
+        filename = (sent.file_name or b"").decode(errors="replace")
+        sent.file_object.seek(0)
+        parts.append(_Part(name, filename, sent.file_object.read()))
 
 
 def _siblings(parts: list[_Part]) -> SiblingFiles:
     by_name: dict[str, File] = {}
     by_filename: defaultdict[str, list[File]] = defaultdict(list)
     for part in parts:
-        file = File(part.name, bytes(part.data))
         if part.name in by_name:
             raise MultipartError(f"two parts have the name {part.name!r}")
-        by_name[part.name] = file
+        file = by_name[part.name] = File(part.name, part.content)
         by_filename[relative_name(part.filename) or ""].append(file)
     names = {relative_name(name) or "": file for name, file in by_name.items()}
 

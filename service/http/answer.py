@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from contextlib import ExitStack
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
@@ -18,7 +17,7 @@ log = logging.getLogger("pns.service")
 
 
 class FileAnswer(Response):
-    """Sends a memory file piece by piece, then lets go of what the request held.
+    """Sends a memory file piece by piece, then releases it.
 
     A client that takes nothing of it for `stall_seconds` is cut off. One that is gone is sent
     nothing more: the pieces that are left would be read for nobody, and hold the event loop. `sent`
@@ -28,7 +27,6 @@ class FileAnswer(Response):
     def __init__(
         self,
         content: MemoryFile,
-        held: ExitStack,
         admission: Admission,
         client: str,
         *,
@@ -37,11 +35,9 @@ class FileAnswer(Response):
         headers: dict[str, str],
         sent: Callable[[], None] = lambda: None,
     ) -> None:
-        super().__init__(
-            media_type=media_type, headers=headers | {"Content-Length": str(content.size)}
-        )
+        always = {"Content-Length": str(content.size), "Vary": "Accept"}
+        super().__init__(media_type=media_type, headers=headers | always)
         self._content = content
-        self._held = held
         self._admission = admission
         self._client = client
         self._stall_seconds = stall_seconds
@@ -49,7 +45,7 @@ class FileAnswer(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
-        with self._held:
+        with self._content:
             taking = self._admission.answering(self._client, self._content.size)
             try:
                 async with self._admission.working(), taking:

@@ -22,7 +22,7 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import docs_page, layers, openapi, page, problems, result_room, routes
+from . import layers, openapi, pages, problems, result_room, routes
 from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
@@ -48,20 +48,21 @@ def create_app(
     *,
     job: Callable[[Work], Done] = jobs.subdivide,
     measure: Callable[[Work], Cost] = jobs.measure,
-    warm_up: Callable[[Model | str | None], None] = jobs.warm_up,
+    warm_up: Callable[[Model | str | None], None] | None = None,
     catalogue: Callable[[], Catalogue] = jobs.catalogue,
 ) -> FastAPI:
     """Create the application, with worker processes that live as long as its lifespan.
 
     `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
     worker calls for each job, `measure` what it calls to predict its cost, `warm_up` what it calls
-    once, before, `catalogue` what one of them calls once, later. A model that does not load leaves
-    the service up: /readyz says 503, scheme=loop and the other models work. Raises
-    KeysError where the file of keys cannot be used, TracingError where traces cannot be sent.
+    once, before (None: `jobs.warm_up`), `catalogue` what one of them calls once, later. A model
+    that does not load leaves the service up: /readyz says 503, scheme=loop and the other models
+    work. Raises KeysError where the file of keys cannot be used, TracingError where traces cannot
+    be sent.
     """
     settings = result_room.fitting(settings or Settings())
     source = model if model is not None else settings.model
-    warm = partial(warm_up, source)
+    warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
     workers = {
         Lane.ANY: Workers(settings.workers, settings.job_seconds, warm),
         Lane.SHORT: Workers(1, settings.job_seconds, warm),
@@ -147,9 +148,8 @@ def create_app(
         )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
-    app.include_router(docs_page.router())
     app.openapi = openapi.Description(app)  # type: ignore[method-assign]
-    app.include_router(page.router(settings.prefix))
+    app.include_router(pages.router(settings.prefix))
     return app
 
 

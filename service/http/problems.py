@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from difflib import get_close_matches
 from http import HTTPStatus
@@ -104,6 +105,12 @@ def of_service_error(error: ServiceError) -> JSONResponse:
 def of_job(error: Exception) -> JSONResponse:
     """Return the document of the error that a job ended with."""
     return of_service_error(error) if isinstance(error, ServiceError) else internal_error()
+
+
+def of_job_view(error: Exception, request_id: str | None) -> dict[str, Any]:
+    """Return the document as a part of a job; `request_id` is that of the request that made it."""
+    # The log has what it says of the job under that id.
+    return json.loads(bytes(of_job(error).body)) | {"request_id": request_id}
 
 
 def _of_validation_error(error: RequestValidationError) -> JSONResponse:

@@ -81,20 +81,21 @@ async def _subdivide(
     with ExitStack() as held:
         async with taken_in(service, request, parameters, wanted) as job:
             (answer,) = job.results
-            held.callback(answer.release)
+            held.enter_context(answer)
             async with service.admission.working():
                 await unless_gone(request.receive, service.desk.serve(job))
         timing = job.seconds | {"total": job.upload_seconds + time.monotonic() - job.admitted}
         stages_text = server_timing(timing)
         _log(job, answer.size, stages_text)
+        # From here on the file is the answer's.
+        held.pop_all()
         return FileAnswer(
             answer,
-            held.pop_all(),
             service.admission,
             job.client,
             stall_seconds=settings.stall_seconds,
             media_type=kind,
-            headers={"Server-Timing": stages_text, "Vary": "Accept"},
+            headers={"Server-Timing": stages_text},
         )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from pns_common.creases import NO_CREASES, Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
+from pns_common.sharpness import creases_by_name
 from pns_common.topology import build_topology
 
 from ..options import Options
@@ -17,12 +18,10 @@ def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
 
     With `crease=auto` these are the scheme's: none for Loop and models of format 1.
     """
-    rule = scheme.creases if options.crease == "auto" else NO_CREASES
-    if options.crease_angle is None and rule.angle is None:
+    if options.crease == "auto" and scheme.creases.finds:
+        return creases_by_name(mesh, scheme.creases, scheme)
+    if options.crease_angle is None:
         return NO_CREASES
     topology = build_topology(mesh.faces, len(mesh.vertices))
-    if options.crease_angle is None:
-        rows = rule.found(mesh.vertices, topology)
-    else:
-        rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
-    return Creases(topology.edges[rows].astype(np.int64), levels=rule.levels)
+    rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
+    return Creases(topology.edges[rows].astype(np.int64))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.columns import level_topologies
-from pns_common.creases import Creases
+from pns_common.creases import NO_CREASES, Creases
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
 from pns_common.schemes import LOOP
@@ -55,7 +56,7 @@ def smooth_uv(
     columns, faces = uv[corner_of].astype(np.float64), flat.reshape(-1, 3)
     grid = connectivity.grid
     levels = grid.segments.bit_length() - 1
-    sharp = Creases(_in_charts(creases.named, faces, vertex[corner_of]), levels=creases.levels)
+    sharp = _in_charts(creases, faces, vertex[corner_of])
     blocks = Blocks(available_threads())
     topologies = level_topologies(faces, len(columns), levels, sharp, blocks=blocks)
     for topology in topologies:
@@ -65,17 +66,22 @@ def smooth_uv(
 
 
 def _in_charts(
-    named: Int[np.ndarray, "N 2"] | None,
-    faces: Int[np.ndarray, "F 3"],
-    vertex: Int[np.ndarray, " P"],
-) -> Int[np.ndarray, "M 2"] | None:
+    creases: Creases, faces: Int[np.ndarray, "F 3"], vertex: Int[np.ndarray, " P"]
+) -> Creases:
     """Return the sides of faces over points of charts that lie on named pairs of vertices."""
+    named = creases.named
     if named is None or len(named) == 0:
-        return None
+        return NO_CREASES
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = int(max(vertex.max(), named.max())) + 1
     ends, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (vertex[sides], named))
-    return sides[np.isin(ends, wanted)]
+    kept = np.isin(ends, wanted)
+    if creases.sharpness is None:
+        return replace(creases, named=sides[kept])
+    # Of a pair that is named twice the sharper one counts.
+    order = np.lexsort((creases.sharpness, wanted))
+    place = np.searchsorted(wanted[order], ends[kept], side="right") - 1
+    return replace(creases, named=sides[kept], sharpness=creases.sharpness[order[place]])
 
 
 def _refined(

@@ -26,6 +26,9 @@ class ModelEntry(BaseModel):
     default: bool = Field(description="whether it is the one that runs without `model=`")
     hash: str = Field(description="sha256 of the file, as in reports")
     size: int | None = Field(description="the file's bytes; null for a model that has no file")
+    providers: list[str] | None = Field(
+        description="what onnxruntime runs it on, preferred first; null without a file"
+    )
     format: int
     features: str = Field(description="feature set of edges", examples=["paper-5"])
     orientation: str = Field(examples=["symmetric"])
@@ -48,6 +51,9 @@ class ModelEntry(BaseModel):
     )
     sharpness_levels: int | None = Field(
         description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
+    )
+    sharpness_features: str | None = Field(
+        description="feature set that says how sharp edges are; null where no network does"
     )
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
@@ -92,6 +98,6 @@ def catalogue_of(models: Models) -> Catalogue:
 
 def _entry(model: Model, *, default: bool) -> ModelEntry:
     # A model that was given to the application need not come from a file.
-    size = getattr(model, "size", None)
-    card = asdict(model.card)
-    return ModelEntry(name=model.name, default=default, hash=model.hash, size=size, **card)
+    size, providers = getattr(model, "size", None), getattr(model, "providers", None)
+    named = {"name": model.name, "hash": model.hash, "size": size, "providers": providers}
+    return ModelEntry(default=default, **named, **asdict(model.card))

@@ -7,7 +7,7 @@ imports this module to name its jobs, and never runs them.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -200,7 +200,7 @@ def _check_answer(work: Work, report: bytes, glb: bytes) -> None:
 _MODELS = Models()
 
 
-def warm_up(model: Model | str | None) -> None:
+def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
     from pns_common import warm_up as compile_kernels
 
@@ -208,12 +208,12 @@ def warm_up(model: Model | str | None) -> None:
     from ..meshfiles import to_gltf  # noqa: F401
 
     compile_kernels(log.info)
-    hold_model(model)
+    hold_model(model, providers)
 
 
-def hold_model(model: Model | str | None) -> None:
+def hold_model(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Load the served model. Raises NoModelError."""
-    _MODELS.hold(model)
+    _MODELS.hold(model, providers)
     _MODELS.get()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,11 +21,15 @@ class Models:
 
     def __init__(self) -> None:
         self._source: Model | str | None = None
+        self._providers: Sequence[str] | None = None
         self._loaded: dict[str, Model] = {}
 
-    def hold(self, source: Model | str | None) -> None:
-        """Serve a model, or the name or file of one; None stands for the default one."""
-        self._source = source
+    def hold(self, source: Model | str | None, providers: Sequence[str] | None = None) -> None:
+        """Serve a model, or the name or file of one; None stands for the default one.
+
+        ``providers`` of onnxruntime run every model that is loaded here; None: the processor.
+        """
+        self._source, self._providers = source, providers
 
     @property
     def served(self) -> Model | str:
@@ -60,13 +65,14 @@ class Models:
 
     def load(self, source: Model | str) -> Model:
         """Load a model where it has not been yet. Raises NoModelError."""
-        from pns_common import ModelError, load_model
+        from pns_common import ModelError, ParameterError, load_model
+        from pns_common.model.session import CPU
 
         if not isinstance(source, str):
             return source
         if source not in self._loaded:
             try:
-                self._loaded[source] = load_model(source)
-            except ModelError as error:
+                self._loaded[source] = load_model(source, self._providers or CPU)
+            except (ModelError, ParameterError) as error:
                 raise NoModelError(str(error)) from error
         return self._loaded[source]

@@ -45,7 +45,7 @@ def test_what_is_installed_is_what_the_tests_ran_with():
 def test_what_the_service_names_is_in_the_image():
     project = (ROOT / "pyproject.toml").read_text()
     named = set()
-    for table in ("dependencies", "service", "store"):
+    for table in ("dependencies", "service", "store", "tracing"):
         (block,) = re.findall(rf"^{table} = \[\s*(.*?)\]$", project, re.MULTILINE | re.DOTALL)
         named |= {normal(name) for name in re.findall(r'"([A-Za-z0-9._-]+)', block)}
     installed = set(pins(REQUIREMENTS[0])) | set(pins(REQUIREMENTS[2]))
@@ -59,10 +59,14 @@ def test_nothing_is_installed_without_a_hash():
         assert "--require-hashes" in install or "--no-index" in install, install
 
 
-def test_every_stage_is_of_the_one_base_that_a_release_names_by_digest():
-    assert re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE) == ["${BASE}", "${BASE}"]
-    recipe = (ROOT / "Makefile").read_text()
-    assert "@sha256:" in recipe.partition("\nimage:")[2].partition("\n\n")[0]
+def test_every_stage_is_of_one_base_that_is_named_by_digest():
+    (python, again), (proxy,) = (
+        re.findall(r"^FROM (\S+)", path.read_text(), re.MULTILINE)
+        for path in (ROOT / "Dockerfile", ROOT / "deploy" / "proxy" / "Dockerfile")
+    )
+    assert python == again
+    assert re.fullmatch(r"python:3\.13\.\d+-slim-bookworm@sha256:[0-9a-f]{64}", python)
+    assert re.fullmatch(r"debian:bookworm-slim@sha256:[0-9a-f]{64}", proxy)
 
 
 def test_the_image_says_what_it_is_made_of():

@@ -1,16 +1,18 @@
 """Learned sharpness: features that know no direction, numbering or side, and weights in bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, ModelError, sharpness
+from pns_common import Mesh, ModelError, loop, pns, refine, sharp_edges, sharpness
 from pns_common.level import Level
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
-from pns_common.sharpness import learned_sharpness, sharpness_inputs
+from pns_common.sharpness import creases_by_name, learned_sharpness, sharpness_inputs
 from pns_common.topology import build_topology
 from tests.support.meshes import (
     block,
@@ -22,7 +24,9 @@ from tests.support.meshes import (
     soups,
     tilted_plane,
 )
+from tests.support.networks import DEFAULT_CARD, sharpening_model
 from tests.support.renumbering import mirrored, renumbered, turned_over
+from tests.support.stand_in_models import ZeroModel
 
 C_V = 100.0
 seeds = st.integers(0, 2**31)
@@ -183,3 +187,49 @@ def test_hubs_cost_no_square_of_their_valence():
 def test_answers_that_are_no_numbers_are_refused(network):
     with pytest.raises(ModelError, match="network"):
         learned_sharpness(level_of(Mesh(*bumpy_sphere())), rule_with(network))
+
+
+def test_automatic_creases_are_those_of_the_network():
+    """As sharp as it says, for the levels on the card, beside what is named; and by name alike."""
+    scheme, mesh = pns(sharpening_model()), Mesh(*bumpy_sphere())
+    made = refine(mesh, scheme, 3)
+    w = learned_sharpness(level_of(mesh), scheme.rule)
+    first, second, third = made.topologies
+    np.testing.assert_array_equal(first.soft, w)
+    np.testing.assert_array_equal(np.sort(second.soft)[-2 * len(w) :], np.sort(np.repeat(w, 2)))
+    assert len(third.soft) == 0
+    counts = [level["edges"].get("soft", 0) for level in made.report["levels"]]
+    assert counts == [(w > 1 / 2).sum(), 2 * (w > 1 / 2).sum(), 0]
+    assert counts[0] > 0
+    named = creases_by_name(mesh, scheme.creases, scheme)
+    again = refine(mesh, scheme, 3, creases=named)
+    np.testing.assert_array_equal(again.mesh.vertices, made.mesh.vertices)
+    marked = refine(mesh, scheme, 1, creases=named.with_named(first.edges[:3].astype(int)))
+    assert marked.report["levels"][0]["edges"]["crease"] == 3
+    expected = first.edges[w > 1 / 2]
+    found = sharp_edges(mesh, scheme=scheme)
+    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, expected.tolist()))
+
+
+def test_a_budget_of_0_is_the_base_scheme_without_sharp_edges():
+    mesh = Mesh(*bumpy_sphere())
+    made = refine(mesh, pns(sharpening_model(), 0), 2).mesh.vertices
+    np.testing.assert_array_equal(made, refine(mesh, loop(), 2).mesh.vertices)
+
+
+@given(manifolds(), seeds)
+def test_the_whole_rule_does_not_depend_on_how_a_mesh_is_seen(mesh, seed):
+    """Other numbers, mirrored, turned over: the same surface, with any sharpness network."""
+    card = replace(DEFAULT_CARD, sharpness_features="crease-53")
+    scheme = pns(ZeroModel(card))
+    assert scheme.rule is not None
+    scheme = replace(scheme, rule=replace(scheme.rule, sharpness_network=random_network(seed)))
+    expected = refine(mesh, scheme, 1).mesh.vertices
+    mirror = [-1.0, 1, 1]
+    for twin, back in (
+        (renumbered(mesh, seed), 1),
+        (mirrored(mesh), mirror),
+        (turned_over(mesh), 1),
+    ):
+        made = refine(twin.mesh, scheme, 1).mesh.vertices[twin.place]
+        np.testing.assert_allclose(made * back, expected, atol=1e-9)

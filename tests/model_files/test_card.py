@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from pns_common.model.card import FORMAT_4_FIELDS, ModelCard
+from pns_common.model.card import FORMAT_4_FIELDS, OPTIONAL_FIELDS, ModelCard
 from tests.support.networks import CARD, DEFAULT_CARD
 
 
@@ -77,7 +77,11 @@ def test_a_retired_field_is_refused_by_name(name):
         ({"sharpness_levels": 1.5}, "sharpness_levels of type float"),
         ({"training": []}, "training of type list"),
         ({"metrics": None}, "missing fields metrics"),
-        *(({name: None}, f"missing field {name} in format 4") for name in FORMAT_4_FIELDS),
+        ({"sharpness_features": "crease-1"}, "sharpness_features 'crease-1', not one of crease-53"),
+        *(
+            ({name: None}, f"missing field {name} in format 4")
+            for name in sorted(set(FORMAT_4_FIELDS) - OPTIONAL_FIELDS)
+        ),
     ],
 )
 def test_a_wrong_field_is_named(changes, says):

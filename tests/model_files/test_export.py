@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import export.run
 from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
-from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity
+from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity, check_sharpness
 from pns_common import ModelError
 from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
@@ -24,7 +24,7 @@ from train.metrics.card import TO_LIMIT
 from train.metrics.one_step import Improvement
 from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network, initial_vertex_network
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 from train.models.recipes import general, paper
 from train.models.tied import TiedNet
 
@@ -57,6 +57,22 @@ def two_networks():
 def two_networks_bytes():
     edges, vertices = two_networks()
     return model_bytes(edges, DEFAULT_CARD, vertices)
+
+
+def test_a_file_of_three_networks_says_what_each_says(tmp_path):
+    edges, vertices = two_networks()
+    sharp = SharpNet(53, (16,), "silu", torch.Generator().manual_seed(0))
+    card = replace(DEFAULT_CARD, sharpness_features="crease-53")
+    path = tmp_path / "three.onnx"
+    write_model(edges, card, path, vertex_network=vertices, sharpness_network=sharp)
+    model, psi = load_model(path), np.random.default_rng(0).random((5000, 53))
+    with torch.no_grad():
+        expected = torch.sigmoid(sharp(torch.from_numpy(psi).float())).numpy()
+    np.testing.assert_allclose(model.sharpness(psi), expected, atol=SINGLE)
+    with torch.no_grad():
+        sharp.linear_layers[0].bias += 1e-2
+    with pytest.raises(ParityError):
+        check_sharpness(model, sharp)
 
 
 @pytest.mark.parametrize("activation", ["gelu", "silu", "tanh"])

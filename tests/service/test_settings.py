@@ -32,6 +32,10 @@ EXAMPLES = {
         "https://a.example,http://[::1]:80",
         ("https://a.example", "http://[::1]:80"),
     ),
+    "providers": (
+        "CUDAExecutionProvider, CPUExecutionProvider",
+        ("CUDAExecutionProvider", "CPUExecutionProvider"),
+    ),
     "hosts": ("pns.example, *.A.example", ("pns.example", "*.a.example")),
     "metrics_host": ("0.0.0.0", "0.0.0.0"),
     "metrics_port": ("9000", 9000),

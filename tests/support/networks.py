@@ -7,7 +7,13 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from pns_common.model.card import CARD_KEY, EDGE_FEATURES, VERTEX_FEATURES, ModelCard
+from pns_common.model.card import (
+    CARD_KEY,
+    EDGE_FEATURES,
+    SHARPNESS_FEATURES,
+    VERTEX_FEATURES,
+    ModelCard,
+)
 from pns_common.model.file import model_from_bytes
 
 PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0
@@ -58,25 +64,31 @@ def perceptron_bytes(layers, *, project=True, card=CARD):
     return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
 
 
-def two_perceptrons_bytes(edges, vertices, *, card=DEFAULT_CARD):
-    """A file of format 4: one perceptron for edges, one for old vertices."""
+def two_perceptrons_bytes(edges, vertices, sharpness=None, *, card=DEFAULT_CARD):
+    """A file of format 4: one perceptron for edges, one for old vertices, one for sharpness."""
     nodes, weights = perceptron(edges)
     more_nodes, more_weights = perceptron(vertices, prefix="vertex_")
-    return model_bytes(
-        nodes + more_nodes,
-        weights | more_weights,
-        card=card,
-        inputs=[
-            ("features", ["edges", len(edges[0][0])]),
-            ("budget", []),
-            ("vertex_features", ["vertices", len(vertices[0][0])]),
-        ],
-        outputs=[("correction", ["edges", 3]), ("vertex_correction", ["vertices", 3])],
-    )
+    inputs = [
+        ("features", ["edges", len(edges[0][0])]),
+        ("budget", []),
+        ("vertex_features", ["vertices", len(vertices[0][0])]),
+    ]
+    outputs = [("correction", ["edges", 3]), ("vertex_correction", ["vertices", 3])]
+    nodes, weights = nodes + more_nodes, weights | more_weights
+    if sharpness is not None:
+        more_nodes, more_weights = perceptron(sharpness, prefix="sharpness_", answer="sigmoid")
+        nodes += [*more_nodes, helper.make_node("Identity", ["sharpness_answer"], ["sharpness"])]
+        weights |= more_weights
+        inputs.append(("sharpness_features", ["sharpened", len(sharpness[0][0])]))
+        outputs.append(("sharpness", ["sharpened", 1]))
+    return model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
 
 
-def perceptron(layers, *, project=True, prefix=""):
-    """Nodes and weights from the input ``features`` to the output ``correction``, prefixed."""
+def perceptron(layers, *, project=True, prefix="", answer="correction"):
+    """Nodes and weights from the input ``features`` to the output ``correction``, prefixed.
+
+    With the answer "sigmoid" the output is ``answer``, the sigmoid of the last layer.
+    """
     nodes, weights, name = [], {}, "features"
 
     def add(operator, inputs, output, **attributes):
@@ -89,6 +101,9 @@ def perceptron(layers, *, project=True, prefix=""):
         name = add("Gemm", [name, f"w{number}", f"b{number}"], f"z{number}")
         if number < len(layers) - 1:
             name = add("Gelu", [name], f"g{number}")
+    if answer == "sigmoid":
+        add("Sigmoid", [name], "answer")
+        return nodes, {f"{prefix}{key}": value for key, value in weights.items()}
     if project:
         weights |= {"one": 1.0, "last": np.array([1])}
         add("ReduceL2", [name, "last"], "length", keepdims=1)
@@ -130,12 +145,22 @@ def default_model_bytes(seed=0, scale=2.0, **changes):
     """A file of format 4 with random weights; of scale 0, the prior alone."""
     edges = random_layers(seed, (EDGE_FEATURES["signed-18"], 16, 3), scale)
     vertices = random_layers(seed + 1, (VERTEX_FEATURES["ring-10"], 16, 3), scale)
-    return two_perceptrons_bytes(edges, vertices, card=replace(DEFAULT_CARD, **changes))
+    card = replace(DEFAULT_CARD, **changes)
+    sharpness = None
+    if card.sharpness_features is not None:
+        widths = (SHARPNESS_FEATURES[card.sharpness_features], 16, 1)
+        sharpness = random_layers(seed + 2, widths, scale)
+    return two_perceptrons_bytes(edges, vertices, sharpness, card=card)
 
 
 def default_model(seed=0, scale=2.0, **changes):
     """A model of format 4 with random weights; of scale 0, the prior alone."""
     return model_from_bytes(default_model_bytes(seed, scale, **changes), "default")
+
+
+def sharpening_model(seed=0, scale=2.0, **changes):
+    """A model of format 4 with random weights, that also says how sharp edges are."""
+    return default_model(seed, scale, sharpness_features="crease-53", **changes)
 
 
 def huge_model(seed):
@@ -188,3 +213,6 @@ class Float64Model:
 
     def vertex_correction(self, features, budget):
         raise AssertionError("format 1 has no vertex network")
+
+    def sharpness(self, features):
+        raise AssertionError("format 1 has no sharpness network")

@@ -25,6 +25,9 @@ class ZeroModel:
     def vertex_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
         return np.zeros((len(features), 3))
 
+    def sharpness(self, features: np.ndarray) -> np.ndarray:
+        return np.zeros((len(features), 1))
+
 
 class CountedModel(ZeroModel):
     """A model that counts how often it is sent somewhere; it arrives as a ZeroModel."""
@@ -37,15 +40,18 @@ class CountedModel(ZeroModel):
 
 
 class Constant:
-    """A model whose networks say one number for edges and one for vertices."""
+    """A model whose networks say one number for edges, one for vertices, and one of sharpness."""
 
     name, hash = "constant", "0" * 64
 
-    def __init__(self, card, edges, vertices):
-        self.card, self.edges, self.vertices = card, edges, vertices
+    def __init__(self, card, edges, vertices, sharpness=0.0):
+        self.card, self.edges, self.vertices, self.sharp = card, edges, vertices, sharpness
 
     def __call__(self, features, budget):
         return np.full((len(features), 3), self.edges)
 
     def vertex_correction(self, features, budget):
         return np.full((len(features), 3), self.vertices)
+
+    def sharpness(self, features):
+        return np.full((len(features), 1), self.sharp)

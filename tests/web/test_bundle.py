@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from service.http.page import FOLDER
+from service.http.pages import PAGE
 
 WEB = Path(__file__).resolve().parents[2] / "web"
 
@@ -32,7 +32,7 @@ def packages() -> None:
 
 def test_the_bundle_is_rebuilt_byte_for_byte(tmp_path: Path) -> None:
     subprocess.run(["node", "build.mjs", str(tmp_path)], cwd=WEB, check=True, capture_output=True)
-    assert contents(tmp_path) == contents(FOLDER)
+    assert contents(tmp_path) == contents(PAGE)
 
 
 def test_the_sources_pass_the_strict_type_checker() -> None:

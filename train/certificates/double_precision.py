@@ -61,9 +61,13 @@ class DoubleModel:
         """Return the weights for the rings of old vertices, float64."""
         return self._answer("vertex_correction", "vertex_features", features, budget)
 
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
+        """Return the sharpness of edges, float64."""
+        return self._answer("sharpness", "sharpness_features", features, 1.0)
+
     def _answer(
         self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
-    ) -> Float[np.ndarray, "N 3"]:
+    ) -> Float[np.ndarray, "N A"]:
         # The evaluator wants every input, also those that this output does not need.
         inputs = {each.given: np.zeros((1, each.columns)) for each in networks(self.card)}
         inputs[given] = np.asarray(features, dtype=np.float64)

@@ -11,11 +11,14 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from pns_common.features import FEATURE_COUNT, Symmetries
+from pns_common.model.card import SHARPNESS_FEATURES
 
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
 
-INPUT_COUNT: Mapping[str, int] = MappingProxyType({**FEATURE_COUNT, RAW_COORDINATES: 12, "crease-53": 53})
+INPUT_COUNT: Mapping[str, int] = MappingProxyType(
+    {**FEATURE_COUNT, **SHARPNESS_FEATURES, RAW_COORDINATES: 12}
+)
 
 
 ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(

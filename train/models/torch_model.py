@@ -11,7 +11,7 @@ from jaxtyping import Float
 from pns_common import ModelError
 from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
 from train.models.checkpoint import joined_state
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 from train.models.recipe import Recipe
 
 
@@ -19,18 +19,20 @@ from train.models.recipe import Recipe
 class TorchModel:
     """Networks with a model card; they keep the library's `Model` protocol.
 
-    `vertex_network` goes with the card's vertex features.
+    `vertex_network` goes with the card's vertex features; `sharpness_network`, whose sigmoid is the
+    sharpness, with its sharpness features.
     """
 
     name: str
     card: ModelCard
     network: BoundedNet
     vertex_network: BoundedNet | None = None
+    sharpness_network: SharpNet | None = None
 
     @property
     def hash(self) -> str:
         """The sha256 of the weights."""
-        weights = joined_state(self.network, self.vertex_network)
+        weights = joined_state(self.network, self.vertex_network, self.sharpness_network)
         return hashlib.sha256(safetensors.torch.save(weights)).hexdigest()
 
     def __call__(
@@ -51,6 +53,19 @@ class TorchModel:
             raise ModelError(self.name, expected="a vertex rule", found="none")
         return _answer(self.vertex_network, features, budget)
 
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
+        """Return the sharpness of edges.
+
+        Raises:
+            ModelError: there is no sharpness network.
+        """
+        if self.sharpness_network is None:
+            raise ModelError(self.name, expected="a sharpness network", found="none")
+        own = self.sharpness_network.linear_layers[0].weight.dtype
+        with torch.no_grad():
+            answer = self.sharpness_network(torch.from_numpy(features).to(own))
+            return torch.sigmoid(answer).numpy()
+
 
 def _answer(
     network: BoundedNet, features: Float[np.ndarray, "N K"], budget: float
@@ -61,10 +76,13 @@ def _answer(
 
 
 def recipe_model(
-    recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None = None
+    recipe: Recipe,
+    network: BoundedNet,
+    vertex_network: BoundedNet | None = None,
+    sharpness_network: SharpNet | None = None,
 ) -> TorchModel:
     """Return a recipe's networks as a model whose card has no metrics yet."""
-    rule, form = recipe.vertex, recipe.scale_free
+    rule, form, sharpness = recipe.vertex, recipe.scale_free, recipe.sharpness
     card = ModelCard(
         format=PAPER_FORMAT if form is None else DEFAULT_FORMAT,
         features=recipe.features,
@@ -75,6 +93,7 @@ def recipe_model(
         metrics={},
         vertex_features=None if rule is None else rule.features,
         vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
+        sharpness_features=None if sharpness is None else sharpness.features,
         **({} if form is None else asdict(form)),
     )
-    return TorchModel(recipe.name, card, network, vertex_network)
+    return TorchModel(recipe.name, card, network, vertex_network, sharpness_network)

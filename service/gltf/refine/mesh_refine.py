@@ -16,6 +16,7 @@ from pns_common.refinement import Refinement, refine, refine_many
 from pns_common.report import Report
 from pns_common.rows import disjoint_faces, extent
 from pns_common.schemes import Scheme
+from pns_common.sharpness import creases_by_name
 from pns_common.topology import split_faces
 
 from ...course import Course
@@ -53,24 +54,45 @@ class RefinedMesh:
     limit_normals: Float[np.ndarray, "V 3"] | None
 
 
-def creases_of(control: ControlMesh, options: Options, scheme: Scheme) -> Creases:
+def creases_of(
+    control: ControlMesh, options: Options, scheme: Scheme, parts: Parts | None = None
+) -> Creases:
     """Return the edges of the mesh to refine that the options keep sharp, by name.
 
-    With `crease=auto` these are the scheme's, and the edges that smooth shading marks as hard.
+    With `crease=auto` these are the scheme's, and the edges that smooth shading marks as hard. Each
+    of the `parts` of a union has those that it has alone.
     """
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
         return Creases(hard_edges(control))
-    by_shape = creases_by_shape(control.mesh, options, scheme)
-    if options.crease != "auto" or scheme.creases.angle is None:
+    if parts is None or options.crease != "auto" or not scheme.creases.learned:
+        by_shape = creases_by_shape(control.mesh, options, scheme)
+    else:
+        by_shape = _creases_of_parts(control, parts, scheme)
+    if options.crease != "auto" or not scheme.creases.finds:
         return by_shape
     return by_shape.with_named(marked_edges(control))
 
 
+def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Creases:
+    """Return the edges that are found in each part of a union, by name."""
+    named, sharpness, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0)], 0
+    for mesh, _ in _jobs(
+        control.mesh, parts.count_faces(control.cleaned.face_map >= 0), NO_CREASES
+    ):
+        found = creases_by_name(mesh, scheme.creases, scheme)
+        if found.named is not None:
+            named.append(first + found.named)
+            own = found.sharpness
+            sharpness.append(np.ones(len(found.named)) if own is None else own)
+        first += len(mesh.vertices)
+    return Creases(np.concatenate(named), np.concatenate(sharpness), levels=scheme.creases.levels)
+
+
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
     """Return the named edges that are sharp at the last level."""
-    return creases.named if creases.sharp_at(levels - 1) else None
+    return creases.sharp_pairs if creases.sharp_at(levels - 1) else None
 
 
 def refined_mesh(
@@ -172,16 +194,21 @@ def _jobs(
     union: Mesh, counts: Int[np.ndarray, " P"], creases: Creases
 ) -> list[tuple[Mesh, Creases]]:
     """Return the parts of a union, whose faces and vertices follow each other, with creases."""
-    named = np.zeros((0, 2), dtype=np.int64) if creases.named is None else creases.named
+    named, sharpness = creases.named, creases.sharpness
+    if named is None:
+        named = np.zeros((0, 2), dtype=np.int64)
     ends = np.cumsum(counts)
     vertex_ends = 1 + np.maximum.reduceat(union.faces.max(axis=1), np.append(0, ends[:-1]))
-    named = named[np.argsort(named[:, 0], kind="stable")]
+    order = np.argsort(named[:, 0], kind="stable")
+    named, sharpness = named[order], None if sharpness is None else sharpness[order]
     crease_ends = np.searchsorted(named[:, 0], vertex_ends)
     jobs: list[tuple[Mesh, Creases]] = []
     face, vertex, crease = 0, 0, 0
     for face_end, vertex_end, crease_end in zip(ends, vertex_ends, crease_ends, strict=True):
         mesh = Mesh(union.vertices[vertex:vertex_end], union.faces[face:face_end] - vertex)
-        jobs.append((mesh, replace(creases, named=named[crease:crease_end] - vertex)))
+        own = slice(crease, crease_end)
+        weights = None if sharpness is None else sharpness[own]
+        jobs.append((mesh, replace(creases, named=named[own] - vertex, sharpness=weights)))
         face, vertex, crease = face_end, vertex_end, crease_end
     return jobs
 

@@ -138,7 +138,7 @@ def refine_together(
     if control.is_empty or not able.all():
         return _chosen(able, meshes, pointers, scheme, options, course, shares)
     with course.stage("weld", shares.weld, shares.refine):
-        creases = creases_of(control, options, scheme)
+        creases = creases_of(control, options, scheme, parts)
         if options.normals != "keep":
             control, parts = _smoothed(control, parts, creases, options)
     with course.stage("refine", shares.refine, shares.attributes):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from contextlib import ExitStack
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -22,7 +21,6 @@ from ..parameters import Parameters
 from ..server_timing import server_timing
 from ..service import Service
 from .book import Entry, NotDoneError
-from .shared import SharedJobs
 from .store import ANSWER, REPORT
 from .work import hand_in, job_json
 
@@ -132,61 +130,43 @@ async def _delete(service: Service, request: Request, job_id: str) -> None:
         await (shared.store.delete if ended else shared.store.cancel)(job_id)
 
 
-async def _shared_result(
-    shared: SharedJobs, service: Service, request: Request, job_id: str, kind: str
-) -> Response:
-    """Answer with the result of a job that another replica has done."""
+async def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
+    """Answer with a file of a job, or the problem that it failed with. Raises ServiceError."""
     client = client_of(request, service.settings).id
-    view = (await shared.find(job_id, client)).view
-    if view["state"] == State.FAILED and view["problem"] is not None:
-        problem = view["problem"]
-        # What failed a while ago for want of room may find some.
-        headers = {"Retry-After": "1"} if problem["status"] == 503 else None
-        return problems.ProblemResponse(problem, problem["status"], headers)
-    if view["state"] != State.DONE:
-        raise NotDoneError(f"the job is {view['state']}")
-    file = await shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
-    held = ExitStack()
-    held.callback(file.release)
+    sent, timing = (lambda: None), {}
+    if service.shared is not None and not service.book.has(job_id):
+        view = (await service.shared.find(job_id, client)).view
+        if view["state"] == State.FAILED and view["problem"] is not None:
+            problem = view["problem"]
+            # What failed a while ago for want of room may find some.
+            headers = {"Retry-After": "1"} if problem["status"] == 503 else None
+            return problems.ProblemResponse(problem, problem["status"], headers)
+        _check_done(view["state"])
+        file = await service.shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
+    else:
+        job = service.book.find(job_id, client).job
+        if job.state is State.FAILED and job.error is not None:
+            return problems.of_job(job.error)
+        _check_done(job.state)
+        answer, report = job.results
+        file = report if kind == media.JSON else answer
+        file.hold()
+        sent = job.fetched.set if file is answer else sent
+        timing = {"Server-Timing": server_timing(job.seconds)}
     return FileAnswer(
         file,
-        held,
         service.admission,
         client,
         stall_seconds=service.settings.stall_seconds,
         media_type=kind,
-        headers={"Vary": "Accept", "Cache-Control": "no-store"},
-    )
-
-
-async def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
-    if service.shared is not None and not service.book.has(job_id):
-        return await _shared_result(service.shared, service, request, job_id, kind)
-    job = _entry(service, request, job_id).job
-    if job.state is State.FAILED and job.error is not None:
-        return problems.of_job(job.error)
-    if job.state is not State.DONE:
-        raise NotDoneError(f"the job is {job.state}")
-    answer, report = job.results
-    file = report if kind == media.JSON else answer
-    file.hold()
-    sent = job.fetched.set if file is answer else lambda: None
-    held = ExitStack()
-    held.callback(file.release)
-    return FileAnswer(
-        file,
-        held,
-        service.admission,
-        client_of(request, service.settings).id,
-        stall_seconds=service.settings.stall_seconds,
-        media_type=kind,
-        headers={
-            "Server-Timing": server_timing(job.seconds),
-            "Vary": "Accept",
-            "Cache-Control": "no-store",
-        },
+        headers=timing | {"Cache-Control": "no-store"},
         sent=sent,
     )
+
+
+def _check_done(state: str) -> None:
+    if state != State.DONE:
+        raise NotDoneError(f"the job is {state}")
 
 
 def _entry(service: Service, request: Request, job_id: str) -> Entry:

@@ -9,10 +9,11 @@ from contextlib import AsyncExitStack, ExitStack, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ...errors import BusyError, WorkerDied
+from ...errors import BusyError, ServiceError, WorkerDied
 from ...options import Options
 from ...workers.job import Job, State
 from ...workers.memory_file import MemoryFile
+from .. import problems
 from ..intake import Asked, Wanted, asked_of, made_of
 from ..result_room import result_folder
 from .book import Entry, NoSuchJobError
@@ -122,6 +123,9 @@ class SharedJobs:
             except BusyError:
                 # There is no room yet.
                 continue
+            except Exception:
+                # A record that this release cannot read, say. Its lease ends; others have a turn.
+                log.exception("a job of another replica is not taken")
 
     async def _adopt(self, service: Service) -> bool:
         """Take one job, where there is one and room for it. Raises StoreError, BusyError."""
@@ -131,7 +135,7 @@ class SharedJobs:
             return False
         content = await self.store.file(BODY, record.id)
         if content is None:
-            await self.store.leave(record.id)
+            await self._fail(record, StoreError("the file is no longer kept: send it again"))
             return True
         settings = service.settings
         fields: dict[str, Any] = record.asked | {"options": Options(**record.asked["options"])}
@@ -140,11 +144,12 @@ class SharedJobs:
         async with AsyncExitStack() as held:
             counted = held.enter_context(service.admission.body(asked.client))
             counted.grow(len(content))
-            body = MemoryFile()
-            body.append(content)
-            job = made_of(
-                settings, asked, body, Wanted(True, True, result_folder(settings), patience)
-            )
+            wanted = Wanted(True, True, result_folder(settings), patience)
+            with ExitStack() as files:
+                body = files.enter_context(MemoryFile())
+                body.append(content)
+                job = made_of(settings, asked, body, wanted)
+                files.pop_all()
             held.callback(job.close)
             job.id = record.id
             entry = service.book.add(job, record.owner)
@@ -152,3 +157,9 @@ class SharedJobs:
             log.info("a job is taken from a replica that has died")
             self._begin(entry, held.pop_all())
         return True
+
+    async def _fail(self, record: Record, error: ServiceError) -> None:
+        """End a job that no replica can do. Raises StoreError."""
+        problem = problems.of_job_view(error, record.asked["request_id"])
+        end = {"state": str(State.FAILED), "queue_place": None, "stage": None, "problem": problem}
+        await self.store.finish(record.id, record.view | end, {})

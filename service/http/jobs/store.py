@@ -191,12 +191,6 @@ class JobStore:
                 await steps.execute()
             await self._files.delete(f"{BODY}:{job_id}")
 
-    async def leave(self, job_id: str) -> None:
-        """Give up a job that no replica can do: its body is gone."""
-        async with self._reached():
-            await self._redis.srem(OPEN, job_id)
-            await self._redis.delete(_lease(job_id))
-
     async def release(self, job_id: str) -> None:
         """End the lease of a job that another replica is to do."""
         async with self._reached():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack, suppress
@@ -35,11 +34,6 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
     """Return a job as its client sees it."""
     queued = job.state is State.QUEUED
     estimate = service.desk.remaining(job)
-    problem = None
-    if job.error is not None:
-        # By the id of the request that handed it in: what the log says of it stands under that.
-        problem = json.loads(bytes(problems.of_job(job.error).body))
-        problem["request_id"] = job.work.request_id
     return {
         "id": job.id,
         "state": str(job.state),
@@ -49,7 +43,7 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
         "estimate_seconds": None if estimate is None else round(estimate, 1),
         "faces": None if job.cost is None else job.cost.faces,
         "format": job.work.target,
-        "problem": problem,
+        "problem": job.error and problems.of_job_view(job.error, job.work.request_id),
     }
 
 

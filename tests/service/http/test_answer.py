@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import pytest
@@ -61,11 +60,8 @@ def answered(
     scope: Scope = {"type": "http", "method": method, "headers": []}
 
     async def scenario(file: CountedFile) -> None:
-        held = ExitStack()
-        held.callback(file.release)
         answer = FileAnswer(
             file,
-            held,
             admission,
             "a",
             stall_seconds=60,

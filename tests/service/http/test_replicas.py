@@ -15,26 +15,32 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import httpx2
 import pytest
 
-from service.http.jobs.store import ANSWER, JobStore
+from service.http.jobs.shared import SharedJobs
+from service.http.jobs.store import ANSWER, BODY, JobStore
 from service.settings import Settings
 from tests.support.live import served
 from tests.support.proxy import free_port
 
 GLB = {"Content-Type": "model/gltf-binary"}
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
-# A replica whose workers do what their bodies say.
+# A replica whose workers do what their bodies say, and whose death is noticed within two seconds.
 REPLICA = """
 from service import log_lines
 from service.http.app import create_app
+from service.http.jobs import shared, store
 from service.http.server import DrainingServer
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 
 if __name__ == "__main__":
+    store.BEAT_SECONDS = shared.BEAT_SECONDS = 0.3
+    store.LEASE_SECONDS = shared.LEASE_SECONDS = 2.0
     log_lines.configure()
     settings = Settings()
     stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
@@ -65,25 +71,34 @@ def redis(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @contextmanager
-def replica(
-    store: str, folder: Path, **settings: str
-) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """The address of a replica in a process of its own, and the process."""
-    script, log = folder / "replica.py", folder / f"log-{os.urandom(4).hex()}"
+def replicas(
+    store: str, folder: Path, *each: dict[str, str]
+) -> Iterator[list[tuple[str, subprocess.Popen[bytes]]]]:
+    """Addresses of replicas in processes of their own, and the processes; started together."""
+    script = folder / "replica.py"
     script.write_text(REPLICA)
     own = {"PNS_PORT": "0", "PNS_WORKERS": "1", "PNS_STORE": store, "PYTHONPATH": str(ROOT)}
-    with log.open("wb") as lines:
-        process = subprocess.Popen(
-            [sys.executable, script], stderr=lines, env=os.environ | own | settings
-        )
+    started = []
     try:
-        while not (told := RUNNING.search(log.read_text())):
-            assert process.poll() is None, log.read_text()
-            time.sleep(0.05)
-        yield f"http://{told[1]}:{told[2]}", process
+        for number, settings in enumerate(each):
+            log = folder / f"log-{number}"
+            with log.open("wb") as lines:
+                process = subprocess.Popen(
+                    [sys.executable, script], stderr=lines, env=os.environ | own | settings
+                )
+            started.append((log, process))
+        yield [(address_in(log, process), process) for log, process in started]
     finally:
-        process.kill()
-        process.wait()
+        for _, process in started:
+            process.kill()
+            process.wait()
+
+
+def address_in(log: Path, process: subprocess.Popen[bytes]) -> str:
+    while not (told := RUNNING.search(log.read_text())):
+        assert process.poll() is None, log.read_text()
+        time.sleep(0.05)
+    return f"http://{told[1]}:{told[2]}"
 
 
 def hand_in(client: httpx2.Client, body: bytes, **headers: str) -> str:
@@ -93,11 +108,9 @@ def hand_in(client: httpx2.Client, body: bytes, **headers: str) -> str:
 
 
 def ended(client: httpx2.Client, job: str) -> dict[str, object]:
-    for _ in range(2400):
-        if (view := client.get(job).json())["state"] not in ("queued", "running"):
-            return view
+    while (view := client.get(job).json())["state"] in ("queued", "running"):
         time.sleep(0.05)
-    raise AssertionError(f"{job} does not end")
+    return view
 
 
 def opened(address: tuple[str, int]) -> httpx2.Client:
@@ -179,28 +192,25 @@ def test_no_job_is_lost_where_a_replica_is_killed(
     """Half of the jobs are one replica's: one runs, the others wait. Each is done by the other."""
     with ExitStack() as stack:
         # A drain that does not wait for what still runs.
-        first, process = stack.enter_context(replica(redis, tmp_path, PNS_DRAIN_SECONDS="0.1"))
-        second, _ = stack.enter_context(replica(redis, tmp_path))
+        two = stack.enter_context(replicas(redis, tmp_path, {"PNS_DRAIN_SECONDS": "0.1"}, {}))
+        process = two[0][1]
         clients = [
-            stack.enter_context(httpx2.Client(base_url=address, timeout=600))
-            for address in (first, second)
+            stack.enter_context(httpx2.Client(base_url=address, timeout=600)) for address, _ in two
         ]
-        waits = tmp_path / "steps"
-        waits.mkdir()
-        jobs = [hand_in(clients[0], f"steps {waits}".encode())]
+        jobs = [hand_in(clients[0], f"steps {tmp_path}".encode())]
         jobs += [hand_in(clients[0], b"echo %d" % number) for number in range(3)]
         jobs += [hand_in(clients[1], b"echo %d" % number) for number in range(3, 6)]
-        while not (waits / "took-1").exists():
+        while not (tmp_path / "took-1").exists():
             time.sleep(0.01)
         process.send_signal(sent)
         process.wait(60)
         for number in (1, 2, 3):
-            (waits / f"go-{number}").touch()
+            (tmp_path / f"go-{number}").touch()
         survivor = clients[1]
         assert [ended(survivor, job)["state"] for job in jobs] == ["done"] * len(jobs)
         contents = [survivor.get(f"{job}/result").content for job in jobs]
         assert contents[1:] == [b"echo %d" % number for number in range(6)]
-        assert contents[0] == f"steps {waits}".encode()
+        assert contents[0] == f"steps {tmp_path}".encode()
 
 
 def test_without_its_store_a_replica_says_so_and_takes_no_job() -> None:
@@ -235,6 +245,43 @@ def test_a_job_that_ends_while_orphans_are_looked_for_keeps_its_result(
         await store.close()
 
     asyncio.run(scenario())
+
+
+def test_a_job_whose_file_is_gone_has_failed(redis: str) -> None:
+    """Its replica died, and the store has lost what was sent: nobody waits for it in vain."""
+    shared = redis.removesuffix("0") + "2"
+
+    view = {"state": "queued", "format": "glb"}
+
+    async def lose_one() -> None:
+        store = JobStore(Settings(store=shared))
+        await store.create("lost", None, {"request_id": "mine"}, view, b"body")
+        await store._files.delete(f"{BODY}:lost")
+        await store.release("lost")
+        await store.close()
+
+    asyncio.run(lose_one())
+    with served(workers=1, store=shared) as where, opened(where) as client:
+        problem = ended(client, "/jobs/lost")["problem"]
+        assert (problem["code"], problem["request_id"]) == ("store-unavailable", "mine")
+        answer = client.get("/jobs/lost/result")
+        assert (answer.status_code, answer.json()) == (503, problem)
+        assert answer.headers["retry-after"] == "1"
+
+
+def test_a_job_that_cannot_be_taken_over_keeps_no_other_from_it(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def adopt(*_: object) -> bool:
+        # Not before it has failed once, and that was logged.
+        assert "no options" in caplog.text, "no options"
+        raise SystemExit
+
+    monkeypatch.setattr("service.http.jobs.shared.LEASE_SECONDS", 0.04)
+    monkeypatch.setattr(SharedJobs, "_adopt", adopt)
+    service: Any = SimpleNamespace(admission=SimpleNamespace(draining=False))
+    with pytest.raises(SystemExit):
+        asyncio.run(SharedJobs(cast("JobStore", None), dict, print).adopt_for_ever(service))
 
 
 def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:

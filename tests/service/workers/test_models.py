@@ -97,7 +97,7 @@ def test_the_catalogue_says_what_the_files_say() -> None:
 
 
 def test_an_entry_has_every_field_of_a_card() -> None:
-    own = {"name", "default", "hash", "size"}
+    own = {"name", "default", "hash", "size", "providers"}
     assert set(ModelEntry.model_fields) == own | set(ModelCard.__dataclass_fields__)
 
 
@@ -109,6 +109,19 @@ def test_a_served_file_is_the_default_and_one_that_does_not_load_is_not_listed(
     missing = serving("missing.onnx")
     assert not any(default for _, default in entries(missing))
     assert "missing" in catalogue_of(missing).names
+
+
+def test_every_model_runs_on_the_providers_that_are_set() -> None:
+    models = Models()
+    models.hold(None, ("CPUExecutionProvider",))
+    assert all(entry["providers"] == ["CPUExecutionProvider"] for entry in entries(models).values())
+
+
+def test_a_provider_that_is_not_there_is_named_with_those_that_are() -> None:
+    models = Models()
+    models.hold(None, ("SpareExecutionProvider",))
+    with pytest.raises(NoModelError, match=r"SpareExecutionProvider.*CPUExecutionProvider"):
+        models.get()
 
 
 def test_a_model_without_a_file_has_no_size() -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Mesh, Scheme, loop, pns
-from pns_common.creases import NO_CREASES, sharp_edges
+from pns_common import Creases, Mesh, Scheme, loop, pns, sharp_edges
+from pns_common.creases import NO_CREASES
 from pns_common.limit import limit_positions
 from pns_common.model.session import Model
 from pns_common.topology import EdgeClass, Topology
@@ -68,17 +68,19 @@ def compute(
     if choice.model is not None:
         scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
     mesh = Mesh(snapshot.points, snapshot.triangles)
-    lines = shown_creases(snapshot, scheme.creases) if choice.crease_lines else NO_CREASES
+    lines = shown_creases(snapshot, scheme) if choice.crease_lines else NO_CREASES
+    soft, lines = (NO_CREASES, lines) if lines.sharpness is None else (lines, NO_CREASES)
     pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle, lines)
-    steps = level_steps(mesh.faces, len(mesh.vertices), choice.levels, pairs, crease_sharpness)
+    counts = len(mesh.vertices), choice.levels
+    steps = level_steps(mesh.faces, *counts, pairs, crease_sharpness, soft)
     positions = refine_positions(
         mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
     )
     plain = steps
-    if lines.named is not None and len(lines.named):
+    if any(found.named is not None and len(found.named) for found in (soft, lines)):
         # Loop alone knows of no lines.
         own = all_creases(snapshot, choice.crease_angle)
-        plain = level_steps(mesh.faces, len(mesh.vertices), choice.levels, *own)
+        plain = level_steps(mesh.faces, *counts, *own)
     distance = _distance_from_loop(mesh, choice, plain, positions, bar)
 
     ratio, gate = _where_it_acted(mesh, scheme, steps, positions, bar)

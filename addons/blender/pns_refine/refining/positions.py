@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from pns_common import Mesh, Refinement, Scheme, loop, refine
+from pns_common import Creases, Mesh, Refinement, Scheme, loop, refine
 from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.reference_length import measure_reference_length
 
@@ -43,7 +43,7 @@ def refine_positions(
     """
     if steps.wears_off:
         return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
-    creases, levels = _or_none(steps.steps[0].creases), len(steps.steps)
+    creases, levels = Creases(steps.steps[0].creases), len(steps.steps)
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
     return Positions(made.mesh.vertices, made.ratio, made.gate, made.normals, dict(made.report))
 
@@ -63,10 +63,10 @@ def _level_by_level(
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
         rule = scheme if scheme.acts_at(depth) else loop()
-        smooth = made = counter.reading(mesh, rule, length, step.creases)
+        smooth = made = counter.reading(mesh, rule, length, step.soft.with_named(step.creases))
         points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
-            made = counter.reading(mesh, rule, length, step.mixture.creases)
+            made = counter.reading(mesh, rule, length, step.soft.with_named(step.mixture.creases))
             points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
             readings.append(_distances(made.report))
         reports.append(made.report)
@@ -117,15 +117,11 @@ class _Counter:
         mesh: Mesh,
         scheme: Scheme,
         length: float,
-        creases: Int[np.ndarray, "N 2"],
+        creases: Creases,
     ) -> Refinement:
-        made = refine(mesh, scheme, 1, length, creases=_or_none(creases), progress=self._tell)
+        made = refine(mesh, scheme, 1, length, creases=creases, progress=self._tell)
         self._done += len(made.mesh.faces)
         return made
 
     def _tell(self, done: int, total: int) -> None:
         self._progress(self._done + done, self._total)
-
-
-def _or_none(creases: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"] | None:
-    return creases if len(creases) else None

@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common import Creases
-from pns_common.topology import Topology, build_topology
+from pns_common import Creases, Mesh, Scheme
+from pns_common.creases import NO_CREASES
+from pns_common.sharpness import creases_by_name
+from pns_common.topology import Topology
 
 from .snapshot import Domain, Snapshot, edge_keys
 
 
-def shown_creases(snapshot: Snapshot, asked: Creases) -> Creases:
+def shown_creases(snapshot: Snapshot, scheme: Scheme) -> Creases:
     """Return the creases of a scheme by name, with the hard edges that the mesh's shading marks.
 
     A mesh whose polygons meet at hard edges alone is flat-shaded, and marks none.
     """
-    if asked.angle is None:
-        return asked
-    topology = build_topology(snapshot.triangles, len(snapshot.points))
-    found = topology.edges[asked.found(snapshot.points, topology)].astype(np.int64)
-    named = Creases(found, levels=asked.levels)
+    if not scheme.creases.finds:
+        return NO_CREASES
+    mesh = Mesh(snapshot.points, snapshot.triangles)
+    topology, named = mesh.topology(), creases_by_name(mesh, scheme.creases, scheme)
     edges, hard = shaded_edges(snapshot, topology)
     return named if hard.all() else named.with_named(edges[hard])
 

@@ -7,12 +7,13 @@ and 1 is sharp for good, as in its own Subdivision Surface.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.creases import NO_CREASES, Creases
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import LOOP
 from pns_common.topology import Topology, build_topology, halves_of, split_faces
@@ -37,10 +38,14 @@ class Mixture:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One level: its topology with the creases that are sharp throughout, and what is between."""
+    """One level: its topology with the creases that are sharp throughout, and what is between.
+
+    ``soft`` names further edges of the topology, each with its sharpness in this level's rules.
+    """
 
     topology: Topology
     creases: Int[np.ndarray, "N 2"]
+    soft: Creases
     mixture: Mixture | None
 
 
@@ -56,7 +61,8 @@ class Steps:
     @cached_property
     def at_last(self) -> Topology:
         """The final topology with the creases that the last level kept sharp, for limits."""
-        return with_creases(self.final, self.last_creases)
+        soft = _halves(self.steps[-1].soft, self.steps[-1].topology)
+        return with_creases(soft.applied_by_name(self.final), self.last_creases)
 
     @cached_property
     def last_creases(self) -> Int[np.ndarray, "N 2"]:
@@ -68,7 +74,7 @@ class Steps:
     def wears_off(self) -> bool:
         """Whether some crease is not sharp for good."""
         first, last = self.steps[0], self.steps[-1]
-        if any(step.mixture is not None for step in self.steps):
+        if any(step.mixture is not None or step.soft.named is not None for step in self.steps):
             return True
         return len(last.creases) != len(first.creases) * 2 ** (len(self.steps) - 1)
 
@@ -89,16 +95,22 @@ def level_steps(
     levels: int,
     pairs: Int[np.ndarray, "N 2"],
     crease_sharpness: Float[np.ndarray, " N"],
+    soft: Creases = NO_CREASES,
 ) -> Steps:
-    """Return ``levels`` levels' topologies; ``pairs`` of vertices name edges of this sharpness."""
+    """Return ``levels`` levels' topologies; ``pairs`` of vertices name edges of this sharpness.
+
+    ``soft`` names edges that blend sharp and smooth rules, at as many levels as it says.
+    """
     steps = []
     kept = crease_sharpness > 0
     pairs, crease_sharpness = pairs[kept], crease_sharpness[kept]
-    for _ in range(levels):
+    for depth in range(levels):
         plain = build_topology(faces, vertex_count)
-        sharp = pairs[crease_sharpness >= 1]
-        topology = with_creases(plain, sharp) if len(sharp) else plain
-        steps.append(Step(topology, sharp, _mixture(plain, pairs, crease_sharpness)))
+        sharp, soft = pairs[crease_sharpness >= 1], soft if soft.sharp_at(depth) else NO_CREASES
+        topology = with_creases(soft.applied_by_name(plain), sharp)
+        mixture = _mixture(plain, pairs, crease_sharpness, soft)
+        steps.append(Step(topology, sharp, soft, mixture))
+        soft = _halves(soft, plain)
         pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
         faces, vertex_count = split_faces(plain, Blocks()), vertex_count + len(plain.edges)
     return Steps(tuple(steps), build_topology(faces, vertex_count), pairs, crease_sharpness)
@@ -139,8 +151,19 @@ def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> Float[np
     return LOOP.place(columns, topology, Blocks(available_threads()))
 
 
+def _halves(soft: Creases, topology: Topology) -> Creases:
+    """Return the halves of edges that are named with their sharpness."""
+    if soft.named is None or soft.sharpness is None:
+        return NO_CREASES
+    halves = halves_of(topology, topology.rows_of(soft.named))
+    return replace(soft, named=halves, sharpness=np.repeat(soft.sharpness, 2))
+
+
 def _mixture(
-    plain: Topology, pairs: Int[np.ndarray, "N 2"], crease_sharpness: Float[np.ndarray, " N"]
+    plain: Topology,
+    pairs: Int[np.ndarray, "N 2"],
+    crease_sharpness: Float[np.ndarray, " N"],
+    soft: Creases,
 ) -> Mixture | None:
     """Mix edges of less than a level left: sharp by that share, and their ends by their mean."""
     ending = crease_sharpness < 1
@@ -153,9 +176,8 @@ def _mixture(
     total = np.bincount(ends, np.repeat(share, 2), plain.vertex_count)
     count = np.bincount(ends, minlength=plain.vertex_count)
     at_vertices = total / np.maximum(count, 1)
-    return Mixture(
-        with_creases(plain, pairs), pairs, np.concatenate([at_vertices, at_edges])[:, None]
-    )
+    topology = with_creases(soft.applied_by_name(plain), pairs)
+    return Mixture(topology, pairs, np.concatenate([at_vertices, at_edges])[:, None])
 
 
 def _worn(

@@ -43,3 +43,8 @@ class WatchedModel:
         """Return corrections of a block of vertices."""
         self.look_up()
         return self.model.vertex_correction(features, budget)
+
+    def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
+        """Return the sharpness of a block of edges."""
+        self.look_up()
+        return self.model.sharpness(features)

@@ -1,13 +1,14 @@
 """Hard edges of a mesh that is shaded smooth stay sharp where lines do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addons.blender.pns_refine.refining.compute import Choice, compute
 from addons.blender.pns_refine.refining.shown_creases import shown_creases
 from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule
-from pns_common import Creases, load_model
-from pns_common.creases import NO_CREASES
+from pns_common import Creases, load_model, loop
 from tests.addons.blender.quads import cube, grid
 
 CELLS = 6
@@ -16,7 +17,11 @@ LINES = Creases(angle=66.0, levels=2)
 
 def hard_edges_alone(shape):
     """What is kept where nothing turns so much that it is a line."""
-    return shown_creases(shape, Creases(angle=179.0)).named
+    return shown_creases(shape, keeping(Creases(angle=179.0))).named
+
+
+def keeping(creases):
+    return replace(loop(), creases=creases)
 
 
 def marks(name, domain, values):
@@ -52,12 +57,12 @@ def test_the_edges_of_a_flat_face_are_hard_and_its_diagonal_is_not():
 
 def test_they_are_kept_beside_lines_for_as_many_levels_and_only_where_lines_are_asked_for():
     shape, middle = with_sharp_middle()
-    made, of_cube = shown_creases(shape, LINES), shown_creases(cube(), LINES)
+    made, of_cube = (shown_creases(each, keeping(LINES)) for each in (shape, cube()))
     assert made.named is not None
     assert of_cube.named is not None
     assert (len(made.named), made.levels) == (len(middle), 2)
     assert len(of_cube.named) == 12
-    assert shown_creases(shape, NO_CREASES).named is None
+    assert shown_creases(shape, loop()).named is None
 
 
 @pytest.mark.parametrize(("kept", "sharp"), [(True, 2 * CELLS), (False, 0)])
