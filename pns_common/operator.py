@@ -197,8 +197,9 @@ def prior(
 
     The first is 0 at those that the rule of surfaces does not move.
     """
-    d, along = pushes(level, rule), rule.curve_strength * curve_pushes(
-        curves, rule.vertex_gate_sharpness
+    d, along = (
+        pushes(level, rule),
+        rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness),
     )
     made = level.base.place(d + along, level.topology, level.blocks)
     made[np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])] = 0.0

@@ -324,7 +324,10 @@ class GeneralRule:
         around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
         curves = Curves(mesh, points)
         of_curves = self.boundary_strength * curves.pushes(self.vertex_gate_sharpness)
-        prior, along = masks(self.prior_strength * pushes(around) + of_curves), curves.prior(of_curves)
+        prior, along = (
+            masks(self.prior_strength * pushes(around) + of_curves),
+            curves.prior(of_curves),
+        )
         edges = read_edges(around, first_face=False)
         frames = edge_frames(edges, first_face=False)
         interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]

@@ -12,7 +12,7 @@ import torch
 from pns_common import loop, pns
 from train.connectivity import connect
 from train.data.pairs import pair_stream as stream
-from train.data.pairs.grid import grid_pair, vertex_normals
+from train.data.pairs.grid import grid_pair
 from train.data.pairs.references import Pair, Reference
 from train.data.primitives import box, globe, icosphere, torus
 from train.fitting import limit_trainer
@@ -20,7 +20,7 @@ from train.fitting.learned_level import learned_level
 from train.fitting.limit_batch import limit_batch
 from train.fitting.limit_loss import limit_loss, measure
 from train.fitting.limit_maps import applied
-from train.fitting.limit_trainer import fit_to_limit, limit_measures, reference_of
+from train.fitting.limit_trainer import fit_to_limit, reference_of
 from train.fitting.sharp_masks import around_vertices, placed
 from train.loop_masks import loop_mask
 from train.models.from_recipe import general_rule, initial_networks

@@ -28,7 +28,7 @@ from train.curve_rule import curve_push
 from train.data.batch import joined_meshes
 from train.fitting.sharp_masks import Sharpness, around_vertices, of_children, placed
 from train.loop_masks import loop_mask
-from train.models.networks import BoundedNet, Networks, unit_correction
+from train.models.networks import BoundedNet, Networks, SharpNet, unit_correction
 from train.models.recipe import Recipe, scale_free_parts
 from train.tensors import dot, shortened
 
@@ -100,9 +100,10 @@ class LearnedLevel:
     push: Float[Tensor, "V 3"]
     numbers: dict[str, float]
 
-    def logits(self, network: torch.nn.Module) -> Float[Tensor, " I"]:
+    def logits(self, network: SharpNet) -> Float[Tensor, " I"]:
         """Return the answers of the sharpness network before the sigmoid."""
-        return network(self.psi.float())[:, 0].double()
+        own = network.linear_layers[0].weight.dtype
+        return network(self.psi.to(own))[:, 0].double()
 
     def sharpness(self, logits: Float[Tensor, " I"]) -> Sharpness:
         """Return w: 1 at boundaries."""
@@ -140,7 +141,9 @@ class LearnedLevel:
         squares = (dot(a, a) + dot(b, b)) / 2
         on_curve = shortened(CURVE_CENTRE * along + CURVE_NEIGHBOUR * ends, n["budget"] * squares)
         vertices = self.at_vertices.corrected(
-            networks.vertex, prior[:count], (1 - second[self.at_vertices.rows]) * self.at_vertices.gate
+            networks.vertex,
+            prior[:count],
+            (1 - second[self.at_vertices.rows]) * self.at_vertices.gate,
         )
         between = self.points[self.edges]
         length = between[:, 1] - between[:, 0]

@@ -47,7 +47,9 @@ def fit_to_limit(
             logits = batch.level.logits(networks.sharp)
             loss = plan.weights.sharp * sharpness_loss(batch, logits)
             if len(losses) >= plan.start:
-                loss = loss + limit_loss(plan.weights, limit_measures(batch, networks, logits), reference)
+                loss = loss + limit_loss(
+                    plan.weights, limit_measures(batch, networks, logits), reference
+                )
             optimiser.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(weights, LONGEST_GRADIENT)

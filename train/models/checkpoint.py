@@ -56,9 +56,7 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "machine": checkpoint.machine,
     }
     data = safetensors.torch.save(
-        joined_state(
-            checkpoint.network, checkpoint.vertex_network, checkpoint.sharpness_network
-        ),
+        joined_state(checkpoint.network, checkpoint.vertex_network, checkpoint.sharpness_network),
         {METADATA_KEY: msgspec.json.encode(facts).decode()},
     )
     path.parent.mkdir(parents=True, exist_ok=True)
