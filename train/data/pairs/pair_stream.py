@@ -21,17 +21,17 @@ from train.data.pairs.swept import swept_pair
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.08,
-        grid_pair: 0.10,
-        sphere_pair: 0.05,
+        patch_pair: 0.05,
+        grid_pair: 0.08,
+        sphere_pair: 0.04,
         faceted_pair: 0.08,
-        lathe_pair: 0.14,
-        swept_pair: 0.06,
+        lathe_pair: 0.10,
+        swept_pair: 0.05,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.24, solid_pairs: 0.25}
+    {machined_pairs: 0.22, solid_pairs: 0.38}
 )
 
 MOST_FACES = 1200
