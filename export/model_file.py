@@ -72,6 +72,7 @@ ORDER = (
     "faces",
     "pool",
     "reuse",
+    "trained_strength",
     "start",
     "learning_rate",
     "final_learning_rate",

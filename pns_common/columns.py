@@ -44,7 +44,8 @@ def level_topologies(
     """
     corners, offsets = as_polygons(faces, vertex_count)
     blocks = blocks or Blocks()
-    topologies = [build_topology((corners, offsets), vertex_count, blocks)]
+    mesh = build_topology((corners, offsets), vertex_count, blocks)
+    topologies = [mesh.with_border(creases.border)]
     if not (topologies[0].triangles or base.polygons):
         raise MeshError("polygons, expected triangles", element="faces")
     if creases.named is not None and creases.sharp_at(0):

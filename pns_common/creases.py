@@ -19,6 +19,9 @@ from pns_common.topology import MOSTLY_SHARP, Topology
 # one that turns by more than SEED.
 ANGLE, SEED = 40.0, 60.0
 HALF_TURN = 180
+# What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
+# OpenSubdiv the first are its VTX_BOUNDARY_EDGE_ONLY and VTX_BOUNDARY_EDGE_AND_CORNER.
+BORDERS = ("smooth", "corners", "fixed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +38,13 @@ class Creases:
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
             limits.
+        border: what boundaries do. "smooth": they become curves. "corners": these end at vertices
+            of one face alone. "fixed": they stay as they are.
 
     Raises:
         ParameterError: pairs that are no pairs of whole numbers, sharpness that is not one number
-            from 0 to 1 a pair, an angle outside 0 … 180, a seed below the angle, or levels below 1.
+            from 0 to 1 a pair, an angle outside 0 … 180, a seed below the angle, levels below 1, or
+            another border.
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
@@ -47,6 +53,7 @@ class Creases:
     seed: float | None = None
     learned: bool = False
     levels: int | None = None
+    border: str = "smooth"
 
     def __post_init__(self) -> None:
         if self.named is not None:
@@ -60,6 +67,8 @@ class Creases:
             raise ParameterError("seed", seed, expected="degrees, from the angle to below 180")
         if levels is not None and not (is_whole(levels) and levels >= 1):
             raise ParameterError("levels", levels, expected="a whole number, at least 1")
+        if self.border not in BORDERS:
+            raise ParameterError("border", self.border, expected=", ".join(BORDERS))
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
         """Return a copy with further pairs of vertices named, of sharpness 1."""
@@ -95,7 +104,7 @@ class Creases:
         normals: Float[np.ndarray, "F 3"] | None = None,
         blocks: Blocks | None = None,
     ) -> Topology:
-        """Return the topology with the edges that are named or found by their angle.
+        """Return the topology with this border, and the edges named or found by their angle.
 
         Args:
             points, topology: the mesh.
@@ -108,7 +117,7 @@ class Creases:
         topology = self.applied_by_name(topology)
         if self.angle is not None:
             topology = topology.with_creases(self.found(points, topology, normals, blocks))
-        return topology
+        return topology.with_border(self.border)
 
     def applied_by_name(self, topology: Topology) -> Topology:
         """Return the topology with the edges that are named.

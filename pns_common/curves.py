@@ -32,7 +32,7 @@ class Curves:
     """The curves of a mesh: its edges of sharpness above 0 that are not irregular.
 
     Attributes:
-        movable: (V,) vertices with w₂ > w₃, on no irregular edge.
+        movable: (V,) vertices with w₂ > w₃, on no irregular edge, not pinned.
         rows: their numbers.
         sides: (N, 2) the two neighbours of each along the curve.
         a, b: (N, 3) from each to these.
@@ -69,6 +69,7 @@ def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
     irregular = kinds == connectivity.IRREGULAR
     movable = share > 0
     movable[mesh.edges[irregular].reshape(-1)] = False
+    movable[mesh.pinned] = False
     rows = np.flatnonzero(movable)
     sides = sharp.neighbours[rows]
     a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))

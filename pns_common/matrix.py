@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import matrix as kernels
@@ -33,6 +33,24 @@ class SubdivisionMatrix:
     columns: Integer[np.ndarray, " N"]
     weights: Float[np.ndarray, " N"]
     shape: tuple[int, int]
+
+    def take(self, rows: Integer[np.ndarray, " M"]) -> SubdivisionMatrix:
+        """Return some of the rows."""
+        starts = self.starts
+        counts = np.diff(starts)[rows]
+        first = np.repeat(starts[rows] - (np.cumsum(counts) - counts), counts)
+        entries = first + np.arange(len(first))
+        own, shape = np.repeat(np.arange(len(rows)), counts), (len(rows), self.shape[1])
+        return SubdivisionMatrix(own, self.columns[entries], self.weights[entries], shape)
+
+    def unmoved(self, still: Bool[np.ndarray, " C"]) -> SubdivisionMatrix:
+        """Return the map whose first rows, where ``still``, are those of the identity."""
+        own = np.flatnonzero(still)
+        left = ~np.isin(self.rows, own)
+        parts = (self.rows, own), (self.columns, own), (self.weights, np.ones(len(own)))
+        rows, columns, weights = (np.concatenate([a[left], b]) for a, b in parts)
+        order = np.argsort(rows, kind="stable")
+        return SubdivisionMatrix(rows[order], columns[order], weights[order], self.shape)
 
     @property
     def starts(self) -> Integer[np.ndarray, " R"]:

@@ -90,6 +90,20 @@ def angle_weighted_normals(
     return total
 
 
+def count_opposed(
+    points: Float[np.ndarray, "N 3"],
+    normals: Float[np.ndarray, "N 3"],
+    faces: Integer[np.ndarray, "F 3"],
+    blocks: Blocks,
+) -> int:
+    """Count the corners whose normal is more than 90 degrees off their triangle's own."""
+    counts = blocks.run(
+        len(faces),
+        lambda begin, end: kernels.count_opposed(points, normals, faces, begin, end),
+    )
+    return int(sum(counts))
+
+
 def smooth_fans(
     faces: Integer[np.ndarray, "F 3"], vertex_count: int, creases: Integer[np.ndarray, "N 2"] | None
 ) -> Integer[np.ndarray, "F 3"]:

@@ -334,6 +334,9 @@ def guard_scale(
     does not depend on numbering, and a child is tested alone, so it is local. A vertex that a
     boundary alone places is scaled only by children that it would fold by itself: what two meshes
     share stays shared.
+
+    It bounds the turns between neighbours too. With normals n, n' of two children and m, m' of
+    their counterparts, ∠(n, n') ≤ ∠(n, m) + ∠(m, m') + ∠(m', n') ≤ ∠(m, m') + 2 ``angle``.
     """
     mesh = level.topology
     scale, changed = np.ones(len(delta)), EVERYWHERE

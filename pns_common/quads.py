@@ -7,6 +7,8 @@ the edge that enters it), and it is face h of the refined mesh.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Integer
 
@@ -35,7 +37,9 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
     vertex_count = parent.vertex_count + edge_count + parent.face_count
     offsets = np.arange(0, len(corners) + 1, QUAD, dtype=np.int32)
     if not parent.plain:
-        made = build_topology((corners, offsets), vertex_count, blocks)
+        made = replace(
+            build_topology((corners, offsets), vertex_count, blocks), pinned=parent.pinned
+        )
         return inheriting(made, parent) if inherit else made
     source = parent if inherit else parent.without_creases()
     halves, arrays = np.empty((edge_count, 2), np.uint32), (parent.corners, parent.offsets)
@@ -67,4 +71,5 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
         edge_class,
         soft,
         plain=True,
+        pinned=parent.pinned,
     )

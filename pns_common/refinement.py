@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Literal, SupportsIndex
+from typing import Any, Literal, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -17,6 +17,7 @@ from pns_common.kernels import are_compiled
 from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.matrix import SubdivisionMatrix, subdivision_matrix
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
 from pns_common.operator import Additions, learned_level
@@ -34,6 +35,7 @@ from pns_common.report import (
     longest,
 )
 from pns_common.schemes import NAMES, Scheme, named_scheme
+from pns_common.selection import Selected, chosen_faces, select
 from pns_common.sharpness import with_sharp_edges
 from pns_common.topology import TRIANGLE, Topology
 
@@ -75,6 +77,7 @@ class Refinement:
             None unless vertices were put on it.
         steps: the levels, from which the report is made when it is first read.
         scheme, limit_shift: for the report.
+        selected: what is left where some faces were refined alone; None: all were.
     """
 
     mesh: Mesh
@@ -84,6 +87,7 @@ class Refinement:
     steps: Sequence[Step] = field(repr=False)
     scheme: Scheme = field(repr=False)
     limit_shift: float = field(repr=False)
+    selected: Selected | None = field(repr=False, default=None)
 
     @cached_property
     def reference_length(self) -> float:
@@ -113,6 +117,20 @@ class Refinement:
         """The connectivity of each level before it was refined: for ``columns.refine_columns``."""
         return [step.level.topology for step in self.steps]
 
+    @cached_property
+    def parents(self) -> SubdivisionMatrix:
+        """The control vertices that each refined vertex is made of, with their weights.
+
+        S with a row for each refined vertex and a column for each control vertex: ``S @ values``
+        carries values of vertices to the refined mesh. It holds the base scheme's masks over all
+        levels; what a model adds to positions, and the step to the limit surface, are not linear or
+        no part of it.
+        """
+        made = subdivision_matrix(self.topologies, self.scheme.base)
+        if self.selected is None:
+            return made
+        return made.unmoved(self.selected.still).take(self.selected.vertices)
+
     def __repr__(self) -> str:
         vertices, faces = len(self.mesh.vertices), self.mesh.face_count
         name, levels = self.scheme.name, len(self.steps)
@@ -132,6 +150,8 @@ def refine(
     *,
     limit: bool = False,
     creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    border: Literal["smooth", "corners", "fixed"] | None = None,
+    faces: Any = None,
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Refinement:
@@ -155,6 +175,9 @@ def refine(
             as sharp as the sharpness network finds it; for a model of format 4 without one, the
             edges that turn by more than 40 degrees and are connected by such edges to one that
             turns by more than 60; none for other schemes. None: no edge.
+        border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
+        faces: refine these alone, by number or as a mask. Neighbours are cut to meet them, and
+            other vertices stay. The report is that of refining all.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -173,9 +196,13 @@ def refine(
     if not is_bool(limit):
         raise ParameterError("limit", limit, expected="True or False")
     kept = chosen_creases(creases, scheme.creases)
+    kept = kept if border is None else replace(kept, border=border)
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
     told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
+    chosen = None if faces is None else chosen_faces(faces, mesh.face_count)
+    if chosen is not None and scheme.base.polygons:
+        raise ParameterError("faces", scheme.name, expected="a scheme of triangles")
 
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level, steps = with_sharp_edges(level, kept, scheme), list[Step]()
@@ -189,10 +216,10 @@ def refine(
             told.level_ends()
     points, normals, shift = steps[-1].points, None, 0.0
     if not limit:
-        faces = scheme.base.faces(level.topology, blocks, np.int64)
+        refined = scheme.base.faces(level.topology, blocks, np.int64)
     else:
         last = scheme.base.split(level.topology, blocks)
-        faces = last.corners.astype(np.int64).reshape(last.face_count, -1)
+        refined = last.corners.astype(np.int64).reshape(last.face_count, -1)
         surface = last, blocks, scheme.base
         shift = limit_shift(points, *surface)
         normals = limit_normals(points, *surface).vertices
@@ -200,14 +227,23 @@ def refine(
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
+    ratio, gate = (nothing, nothing) if added is None else (added.ratio, added.gate)
+    selected = None
+    if chosen is not None:
+        selected = select(chosen, [step.level.topology for step in steps], refined, len(points))
+        refined, rows = selected.faces, selected.vertices
+        points, ratio, gate = points[rows], ratio[rows], gate[rows]
+        points[: len(mesh.vertices)][selected.still] = mesh.vertices[selected.still]
+        normals = None if normals is None else normals[rows]
     return Refinement(
-        mesh=Mesh.of_refined(points, faces),
-        ratio=nothing if added is None else added.ratio,
-        gate=nothing if added is None else added.gate,
+        mesh=Mesh.of_refined(points, refined),
+        ratio=ratio,
+        gate=gate,
         normals=normals,
         steps=steps,
         scheme=scheme,
         limit_shift=shift,
+        selected=selected,
     )
 
 

@@ -73,8 +73,9 @@ def sector_kinds(topology: Topology, around: Sectors) -> Integer[np.ndarray, " S
     """Return the kind of each sector: closed, or by the sharp edges at its vertex."""
     kind = np.full(len(around.first), CLOSED, dtype=np.int64)
     if around.opened:
-        sharp = topology.sharp_count[around.vertex[: around.opened]]
-        kind[: around.opened] = np.minimum(sharp, CORNER)
+        sharp = topology.sharp_count.copy()
+        sharp[topology.pinned] = CORNER
+        kind[: around.opened] = np.minimum(sharp[around.vertex[: around.opened]], CORNER)
     return kind
 
 

@@ -6,7 +6,7 @@ appearance over the faces, (a, b), (b, c), … from each face's first corner on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 
@@ -25,6 +25,7 @@ NO_WEIGHTS = np.zeros(0)
 # Edges of a sharpness above this count as sharp where there is only yes and no.
 MOSTLY_SHARP = 1 / 2
 NO_FACES = np.zeros(0, dtype=np.uint32)
+NO_VERTICES = np.zeros(0, dtype=np.int64)
 
 
 class EdgeClass(IntEnum):
@@ -70,6 +71,7 @@ class Topology:
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
         plain: no face names a vertex twice, and no two triangles have the same vertices.
+        pinned: vertices on boundaries that stay where they are.
     """
 
     vertex_count: int
@@ -82,6 +84,7 @@ class Topology:
     edge_class: Integer[np.ndarray, " E"]
     soft: Float[np.ndarray, " S"]
     plain: bool
+    pinned: Integer[np.ndarray, " P"] = field(default_factory=lambda: NO_VERTICES)
 
     @property
     def face_count(self) -> int:
@@ -162,6 +165,7 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
+        weights[self.pinned] = 1.0
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
     @cached_property
@@ -221,6 +225,16 @@ class Topology:
         if len(self.soft):
             soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
         return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+
+    def with_border(self, rule: str) -> Topology:
+        """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
+        if rule == "smooth":
+            return self
+        pinned = np.zeros(self.vertex_count, dtype=bool)
+        pinned[self.edges[self.edge_class == kernels.BOUNDARY]] = True
+        if rule == "corners":
+            pinned &= np.bincount(self.corners, minlength=self.vertex_count) == 1
+        return replace(self, pinned=np.flatnonzero(pinned))
 
     def without_creases(self) -> Topology:
         """Return a copy without creases and soft edges."""
@@ -327,7 +341,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
     if not parent.plain:
-        made = build_topology(faces, vertex_count, blocks)
+        made = replace(build_topology(faces, vertex_count, blocks), pinned=parent.pinned)
         return inheriting(made, parent) if inherit else made
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
@@ -361,6 +375,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         edge_class,
         child_soft,
         plain=True,
+        pinned=parent.pinned,
     )
 
 

@@ -12,7 +12,6 @@ from jaxtyping import Int
 from pns_common.creases import Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.report import LevelReport
-from pns_common.topology import build_topology
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
@@ -43,7 +42,7 @@ def count_bends(
     """
     if creases.named is None:
         return [NO_BENDS] * parts
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
     sharp = creases.applied_by_name(topology).is_sharp[bent]
     part = np.zeros(len(bent), dtype=np.int64)

@@ -13,10 +13,12 @@ MAX_LEVELS = 6
 # The library's, without its import (tests hold them equal).
 DEFAULT_LEVELS = 2
 
-SchemeName = Literal["pns", "loop"]
+SchemeName = Literal["auto", "pns", "loop", "catmull-clark"]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
 NormalRule = Literal["auto", "keep", "smooth", "limit"]
+WeldRule = Literal["position", "index", "off"]
+BorderRule = Literal["smooth", "corners", "fixed"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
@@ -33,18 +35,23 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface. Raises InvalidParameter.
+    vertices on the limit surface; `material` and `group` name the faces to refine (None: all).
+    Raises InvalidParameter.
     """
 
     levels: int = DEFAULT_LEVELS
-    scheme: SchemeName = "pns"
+    scheme: SchemeName = "auto"
     budget: float | None = None
     reference_length: float | Literal["auto"] = "auto"
     diagnostics: Diagnostics = "summary"
     uv: UvRule = "linear"
     normals: NormalRule = "auto"
     crease: str = "auto"
+    weld: WeldRule = "position"
     weld_tolerance: float = 0.0
+    border: BorderRule = "smooth"
+    material: str | None = None
+    group: str | None = None
     compress: Compression = "none"
     limit: bool = False
 
@@ -58,6 +65,8 @@ class Options:
         check_choice("compress", self.compress, get_args(Compression))
         check_choice("uv", self.uv, get_args(UvRule))
         check_choice("normals", self.normals, get_args(NormalRule))
+        check_choice("weld", self.weld, get_args(WeldRule))
+        check_choice("border", self.border, get_args(BorderRule))
         if self.normals == "limit" and not self.limit:
             raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
@@ -77,6 +86,18 @@ class Options:
             raise InvalidParameter(
                 "weld_tolerance", f"weld_tolerance must be 0 to {MAX_WELD_TOLERANCE}"
             )
+        if self.weld_tolerance and self.weld != "position":
+            raise InvalidParameter("weld_tolerance", "weld_tolerance needs weld=position")
+
+    @property
+    def learns(self) -> bool:
+        """True if a model is asked for, if only for meshes of triangles."""
+        return self.scheme in ("auto", "pns")
+
+    @property
+    def selects(self) -> bool:
+        """True if some faces are refined alone."""
+        return self.material is not None or self.group is not None
 
     @property
     def crease_angle(self) -> float | None:

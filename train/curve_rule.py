@@ -2,8 +2,8 @@
 
 A curve becomes a cubic B-spline; its limit at a vertex p between a and b is p + (a + b − 2 p) / 6.
 The push is that taken back, across the curve, times γ = tanh(c_v x) f(x): x = 1 − the cosine of the
-turning angle, and f falls from 1 at 60 degrees to 0 at 90, since sharper corners are meant. A vertex
-belongs to the curve along its two sharpest edges by w₂ − w₃.
+turning angle, and f falls from 1 at 60 degrees to 0 at 90, since sharper corners are meant. A
+vertex belongs to the curve along its two sharpest edges by w₂ − w₃.
 """
 
 from dataclasses import dataclass

@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pns_common import PnsError, pns
 from train.certificates.command import certify_command
+from train.experiments.beyond.validation import validate_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import Fit, fit
@@ -56,6 +57,7 @@ app = typer.Typer(
 )
 app.command("reproduce")(reproduce_command)
 app.command("certify")(certify_command)
+app.command("validate")(validate_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -37,6 +37,24 @@ PICTURES = (
     Picture(
         "blender-sheet.png", ("fish.obj",), ("clay", "zebra", "wire", "distance", "ratio"), 125
     ),
+    Picture(
+        "blender-subsurf.png",
+        ("suzanne", "cube", "cylinder", "spot.obj"),
+        ("clay",),
+        30,
+        (
+            "--variants",
+            "control",
+            "subsurf",
+            "pns",
+            "--levels",
+            "2",
+            "--cell",
+            "240",
+            "--samples",
+            "16",
+        ),
+    ),
     Picture("blender-part.png", (PART,), ("clay", "zebra", "distance"), -20),
 )
 
@@ -44,7 +62,8 @@ PICTURES = (
 def main(python: str, part: str) -> None:
     """Render them one after another."""
     for picture in PICTURES:
-        meshes = [part if name == PART else str(MESHES / name) for name in picture.meshes]
+        meshes = [name if "." not in name else str(MESHES / name) for name in picture.meshes]
+        meshes = [part if name == PART else name for name in meshes]
         output = ROOT / "docs" / picture.name
         arguments = ["--looks", *picture.looks, "--turn", str(picture.turn), *picture.more]
         command = [python, str(RENDER), *meshes, "-o", str(output), *arguments]

@@ -73,6 +73,7 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     asked = SimpleNamespace(
         scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False, quads=False
     )
+    asked.uv_smooth = "PRESERVE_BOUNDARIES"
     asked.model, asked.model_file, asked.budget = DEFAULT_MODEL, "", load_model().card.budget
     run = Run(refine_meshes([obj], choice_of(asked), Share()))
     longest, done = 0.0, False

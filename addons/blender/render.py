@@ -3,8 +3,9 @@
 PYTHON addons/blender/render.py MESH… -o SHEET.png [--looks clay zebra] [--levels 3]
 PYTHON addons/blender/render.py MESH… -o TURN.mp4 --frames 48      # a turntable
 
-PYTHON has bpy and the project's library. Several meshes make several rows of each look. The camera,
-the light and the scale of a row are fixed, so its cells can be compared.
+MESH is a file, or suzanne, cube or cylinder. PYTHON has bpy and the project's library. Several
+meshes make several rows of each look. The camera, the light and the scale of a row are fixed, so
+its cells can be compared.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from addons.blender.pictures import files, sheet, stage
 from addons.blender.pictures.looks import LOOKS
 from addons.blender.pictures.variants import VARIANTS
+
+SHEET = ["control", "loop", "n1", "pns"]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -63,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     made.add_argument("meshes", nargs="+", type=Path, metavar="MESH")
     made.add_argument("-o", "--output", type=Path, required=True)
-    made.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS))
+    made.add_argument("--variants", nargs="+", choices=VARIANTS, default=SHEET)
     made.add_argument(
         "--looks", nargs="+", choices=[*LOOKS, *sheet.FIELDS], default=[*LOOKS, *sheet.FIELDS]
     )

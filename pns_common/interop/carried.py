@@ -57,12 +57,20 @@ def refine_carried(
 ) -> tuple[CarriedMesh, Refinement]:
     """Return the refined mesh with its data, and the refinement of the joined surface.
 
-    ``options`` are further arguments of ``refine``; creases name vertices of ``mesh``. Raises what
-    ``refine`` and ``Mesh`` raise.
+    ``options`` are further arguments of ``refine``, and ``weld``: "position" joins vertices in one
+    place, "index" none, so that poses keep one numbering. Creases name vertices of ``mesh``. Raises
+    what ``refine`` and ``Mesh`` raise.
     """
     given = Mesh(mesh.vertices, mesh.faces)
-    joined, first = join_by_position(given.vertices)
     options = dict(options)
+    weld = options.pop("weld", "position")
+    if weld not in ("position", "index"):
+        raise ParameterError("weld", weld, expected="position or index")
+    if options.get("faces") is not None:
+        raise ParameterError("faces", "given", expected="a Mesh or two arrays, which have no data")
+    joined = first = np.arange(len(given.vertices))
+    if weld == "position":
+        joined, first = join_by_position(given.vertices)
     creases = options.get("creases", "auto")
     if isinstance(creases, Creases) and creases.named is not None:
         options["creases"] = replace(creases, named=_renamed(creases.named, joined))

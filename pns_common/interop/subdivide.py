@@ -80,8 +80,8 @@ def subdivide(
             pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles; or
             a trimesh ``Scene`` or pyvista ``MultiBlock`` of such and other parts, which stay.
             Meshes of a library keep texture coordinates, colours and other data, interpolated
-            linearly; their vertices at the same position are one vertex of the surface. A pair and
-            a ``Mesh`` are refined as they are.
+            linearly; their vertices at the same position are one vertex of the surface, unless
+            ``weld="index"`` is among the options. A pair and a ``Mesh`` are refined as they are.
         levels: number of steps, 1 … 16.
         scheme: None for ``pns(load_model())``.
         triangulate: cut polygons into triangles first, which is right for convex ones.

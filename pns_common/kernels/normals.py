@@ -18,6 +18,8 @@ from pns_common.kernels.vectors import across, between, cross, divisor, dot, nor
 
 # Unit vectors whose weighted sum is shorter have no direction to trust.
 NO_DIRECTION = 1e-9
+# Cosines of single precision that are no less than 0.
+ROUNDED = 1e-5
 HALF_PI, QUARTER_PI = math.pi / 2, math.pi / 4
 # What π/2 and π/4 as numbers leave out.
 LEFT_OF_HALF, LEFT_OF_QUARTER = 6.123233995736766e-17, 3.061616997868383e-17
@@ -48,6 +50,19 @@ def angle_between(sine, cosine):
     left = 0.0 if gentle else LEFT_OF_HALF if steep else LEFT_OF_QUARTER
     acute = base + (t * (z * p / q) + t + left)
     return math.pi - acute if cosine < 0 else acute
+
+
+@kernel
+def count_opposed(points, normals, faces, begin, end):
+    """Return how many corners of faces begin … end − 1 have a normal more than 90 degrees off."""
+    count = 0
+    for f in range(begin, end):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        area = cross(between(points, a, b), between(points, a, c))
+        least = -ROUNDED * norm(area)
+        for corner in range(3):
+            count += dot(row(normals, faces[f, corner]), area) < least
+    return count
 
 
 @kernel

@@ -15,12 +15,16 @@ from .sibling_files import ALONE, SiblingFiles
 
 @dataclass(frozen=True)
 class Sent:
-    """A document, what it is ("glb", "gltf", "obj", …), its siblings, and what it has lost."""
+    """A document, what it is ("glb", "gltf", "obj", …), its siblings, and what it has lost.
+
+    `parts` are primitives to refine alone that a conversion found; None: it looked for none.
+    """
 
     data: bytes
     kind: media.Kind
     siblings: SiblingFiles = ALONE
     losses: tuple[Change, ...] = ()
+    parts: frozenset[int] | None = None
 
 
 def sent(body: bytes, content_type: str, limits: Limits) -> Sent:

@@ -16,17 +16,21 @@ from ..printable import printable
 from .errors import FAILURE, explained
 from .parameters import (
     AddressOption,
+    BorderOption,
     BudgetOption,
     CompressOption,
     CreaseOption,
     DiagnosticsOption,
     EngineOption,
+    GroupOption,
     LengthOption,
     LevelsOption,
     LimitOption,
+    MaterialOption,
     ModelOption,
     NormalsOption,
     SchemeOption,
+    ToleranceOption,
     UvOption,
     WeldOption,
     WorkersOption,
@@ -107,12 +111,26 @@ def subdivide(
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
     crease: CreaseOption = DEFAULTS.crease,
-    weld_tolerance: WeldOption = DEFAULTS.weld_tolerance,
+    weld: WeldOption = DEFAULTS.weld,
+    weld_tolerance: ToleranceOption = DEFAULTS.weld_tolerance,
+    border: BorderOption = DEFAULTS.border,
+    material: MaterialOption = DEFAULTS.material,
+    group: GroupOption = DEFAULTS.group,
     compress: CompressOption = DEFAULTS.compress,
     limit: LimitOption = DEFAULTS.limit,
     report: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", parser=local_path, help="write the report of one IN too"),
+    ] = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="FILE.npz",
+            parser=local_path,
+            help="write what each vertex of OUT is made of: weights of the vertices of IN, a row "
+            "each, as scipy.sparse.load_npz reads them (OBJ, PLY, STL, OFF)",
+        ),
     ] = None,
     to: Annotated[
         str | None,
@@ -127,7 +145,7 @@ def subdivide(
     from ..meshfiles.convert import Jobs, convert
     from ..settings import Settings
 
-    jobs = Jobs(sources, output, report, to, read_as, force)
+    jobs = Jobs(sources, output, report, map_, to, read_as, force)
     failed = 0
     for error in convert(jobs, options_of(context), model, Settings().job_limits()):
         if len(sources) == 1 or explained(error) is None:
@@ -154,7 +172,11 @@ def batch(
     uv: UvOption = DEFAULTS.uv,
     normals: NormalsOption = DEFAULTS.normals,
     crease: CreaseOption = DEFAULTS.crease,
-    weld_tolerance: WeldOption = DEFAULTS.weld_tolerance,
+    weld: WeldOption = DEFAULTS.weld,
+    weld_tolerance: ToleranceOption = DEFAULTS.weld_tolerance,
+    border: BorderOption = DEFAULTS.border,
+    material: MaterialOption = DEFAULTS.material,
+    group: GroupOption = DEFAULTS.group,
     compress: CompressOption = DEFAULTS.compress,
     limit: LimitOption = DEFAULTS.limit,
     to: Annotated[

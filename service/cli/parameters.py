@@ -11,12 +11,14 @@ import typer
 from ..options import (
     MAX_LEVELS,
     MAX_WELD_TOLERANCE,
+    BorderRule,
     Compression,
     Diagnostics,
     NormalRule,
     Options,
     SchemeName,
     UvRule,
+    WeldRule,
 )
 
 
@@ -49,7 +51,10 @@ def _reference_length(text: str) -> float | Literal["auto"]:
 LevelsOption = Annotated[
     int, typer.Option(help=f"depth, 1 to {MAX_LEVELS}: four faces of one at each level")
 ]
-SchemeOption = Annotated[SchemeName, typer.Option(help="the rules")]
+SchemeOption = Annotated[
+    SchemeName,
+    typer.Option(help="the rules; auto: pns for triangles, catmull-clark for polygons"),
+]
 BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
 ModelOption = Annotated[
     str | None,
@@ -83,6 +88,27 @@ CreaseOption = Annotated[
     ),
 ]
 WeldOption = Annotated[
+    WeldRule,
+    typer.Option(
+        help="which vertices are one. position: those in one place. index: those that the file "
+        "gives one number, so that poses keep one numbering. off: corners alike in all they have"
+    ),
+]
+BorderOption = Annotated[
+    BorderRule,
+    typer.Option(
+        help="boundaries. smooth: curves. corners: curves that end at vertices of one face. "
+        "fixed: as they are"
+    ),
+]
+MaterialOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="refine only the faces of this material")
+]
+GroupOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="refine only this group or object (OBJ), or mesh (glTF)"),
+]
+ToleranceOption = Annotated[
     float,
     typer.Option(
         metavar="X", help=f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than X times R"

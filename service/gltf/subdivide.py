@@ -8,11 +8,11 @@ from itertools import chain
 from typing import Any
 
 from pns_common.model.session import Model
-from pns_common.schemes import Scheme, loop, pns
+from pns_common.schemes import Scheme, catmull_clark, loop, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
-from ..errors import NoModelError
+from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
 from .read.container import write_glb
@@ -44,11 +44,13 @@ class Subdivided:
         glb: the file, with the report in it unless `diagnostics=none`.
         report: the report.
         timings: seconds by stage (read, weld, refine, attributes, write).
+        faces_in: faces before refinement.
     """
 
     glb: bytes
     report: dict[str, Any]
     timings: dict[str, float]
+    faces_in: int
 
 
 def subdivide_gltf(
@@ -60,11 +62,13 @@ def subdivide_gltf(
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
     losses: Sequence[Change] = (),
+    parts: frozenset[int] | None = None,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
     `course` receives the progress. `siblings` are the files that the document may name. `losses`
-    are changes of an earlier conversion to glTF, for the report.
+    are changes of an earlier conversion to glTF, for the report; `parts` the primitives to refine
+    that it found.
 
     Raises:
         ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
@@ -87,9 +91,11 @@ def subdivide_gltf(
     outcomes: dict[int, tuple[MeshResult, list[Change]]] = {}
     vertices = VertexUse(upload.document)
     alike = same_geometry(upload.document, (plan.mesh for plan in upload.plans))
+    if options.selects:
+        alike = {plan.mesh: list[int]() for plan in upload.plans}
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
     with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course):
+        for first in refined_meshes(upload, firsts, scheme, options, course, parts):
             with course.stage("write"):
                 written = writer.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]
@@ -120,20 +126,36 @@ def subdivide_gltf(
             put_report(upload.tree, report)
         pieces = writer.finish()
         glb = write_glb(encode(upload.tree), pieces, upload.container.others)
-    return Subdivided(glb=glb, report=report, timings=course.seconds)
+    faces_in = sum(plan.faces for plan in upload.plans)
+    return Subdivided(glb=glb, report=report, timings=course.seconds, faces_in=faces_in)
 
 
 def make_scheme(options: Options, model: Model | None) -> Scheme:
-    """Return the scheme that the options name.
+    """Return the scheme that the options name for triangles.
 
     Raises:
-        NoModelError: `scheme=pns` without a model.
+        InvalidParameter: `scheme=catmull-clark`, which makes no triangles.
+        NoModelError: a model is asked for, and there is none.
     """
     if options.scheme == "loop":
         return loop()
+    if options.scheme == "catmull-clark":
+        reason = "catmull-clark refines polygons, of OBJ, PLY, STL and OFF: a glTF has triangles"
+        raise InvalidParameter("scheme", reason)
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
     return pns(model, options.budget)
+
+
+def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
+    """Return the scheme that refines polygons as such; None: they are cut into triangles."""
+    if options.scheme == "catmull-clark":
+        return catmull_clark()
+    if options.learns and model is not None:
+        made = make_scheme(options, model)
+        if made.base.polygons or made.for_polygons is not None:
+            return made if made.for_polygons is None else made.for_polygons()
+    return catmull_clark() if options.scheme == "auto" else None
 
 
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:

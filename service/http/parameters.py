@@ -14,12 +14,14 @@ from ..options import (
     DEFAULTS,
     MAX_LEVELS,
     MAX_WELD_TOLERANCE,
+    BorderRule,
     Compression,
     Diagnostics,
     NormalRule,
     Options,
     SchemeName,
     UvRule,
+    WeldRule,
 )
 
 
@@ -54,7 +56,9 @@ class Parameters(BaseModel):
     )
     scheme: SchemeName = Field(
         default=DEFAULTS.scheme,
-        description="`loop` is the same path without the learned correction",
+        description="`auto`: `pns` for files of triangles, `catmull-clark` for OBJ, PLY and OFF "
+        "files with polygons; `pns` and `loop` cut polygons into triangles, and `loop` is without "
+        "the learned correction",
     )
     model: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=None,
@@ -96,6 +100,12 @@ class Parameters(BaseModel):
         "says), `off`, `normals` (edges whose two sides carry different normals) or `angle:` and "
         "degrees (edges whose faces meet at more)",
     )
+    weld: WeldRule = Field(
+        default=DEFAULTS.weld,
+        description="which vertices are one: `position`, those in one place; `index`, those that "
+        "the file gives one number, so that poses of one file keep one numbering; `off`, corners "
+        "that are alike in all they have",
+    )
     weld_tolerance: float = Field(
         default=DEFAULTS.weld_tolerance,
         ge=0,
@@ -103,7 +113,20 @@ class Parameters(BaseModel):
         allow_inf_nan=False,
         description="join vertices nearer than this times R; 0: exactly equal ones alone",
     )
-
+    border: BorderRule = Field(
+        default=DEFAULTS.border,
+        description="what boundaries do: `smooth`, they become curves; `corners`, these end at "
+        "vertices of one face alone; `fixed`, boundaries stay as they are",
+    )
+    material: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=DEFAULTS.material,
+        description="refine only the faces of this material; their neighbours are cut to meet them",
+    )
+    group: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
+        default=DEFAULTS.group,
+        description="refine only this group or object of an OBJ, or mesh of a glTF, by its name or "
+        "that of a node that shows it",
+    )
     compress: Compression = Field(
         default=DEFAULTS.compress,
         description="`meshopt` is exact; `draco` is smaller, and rounds positions, normals and UVs",

@@ -8,13 +8,12 @@ from pns_common.creases import NO_CREASES, Creases, edge_cosines
 from pns_common.mesh import Mesh
 from pns_common.schemes import Scheme
 from pns_common.sharpness import creases_by_name
-from pns_common.topology import build_topology
 
 from ..options import Options
 
 
 def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges of a mesh of triangles that the options keep sharp by its shape, by name.
+    """Return the edges of a mesh that the options keep sharp by its shape, by name.
 
     With `crease=auto` these are the scheme's: none for Loop and models of format 1.
     """
@@ -22,6 +21,6 @@ def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
         return creases_by_name(mesh, scheme.creases, scheme)
     if options.crease_angle is None:
         return NO_CREASES
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
     return Creases(topology.edges[rows].astype(np.int64))

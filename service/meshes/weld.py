@@ -23,18 +23,19 @@ class Weld:
 
     Attributes:
         points: (V, 3) positions of the welded vertices.
-        faces: (F, 3) welded vertices, numbered by first appearance over these corners.
+        faces: (F, K) welded vertices, three of a triangle or one of a corner, numbered by first
+            appearance over these corners.
         vertex_of: (N,) the welded vertex of each file vertex; −1 where no face uses it.
     """
 
     points: Float[np.ndarray, "V 3"]
-    faces: Int[np.ndarray, "F 3"]
+    faces: Int[np.ndarray, "F K"]
     vertex_of: Int[np.ndarray, " N"]
 
 
 def weld(
     positions: Float[np.ndarray, "N 3"],
-    faces: Int[np.ndarray, "F 3"],
+    faces: Int[np.ndarray, "F K"],
     movement: Int[np.ndarray, " N"] | None = None,
 ) -> Weld:
     """Join the vertices whose positions are equal (−0 = 0), whatever lies near them.
@@ -50,7 +51,7 @@ def weld(
 
 def weld_by_label(
     positions: Float[np.ndarray, "N 3"],
-    faces: Int[np.ndarray, "F 3"],
+    faces: Int[np.ndarray, "F K"],
     labels: Int[np.ndarray, " N"],
 ) -> Weld:
     """Join the vertices that share a label, at the position of the first corner of each."""
@@ -59,7 +60,7 @@ def weld_by_label(
     points = np.take(positions, flat[first], axis=0).astype(np.float64)
     vertex_of = np.full(len(positions), -1, dtype=np.int64)
     vertex_of[flat] = group
-    return Weld(points=points, faces=group.reshape(-1, 3), vertex_of=vertex_of)
+    return Weld(points=points, faces=group.reshape(faces.shape), vertex_of=vertex_of)
 
 
 def canonical_zero(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:

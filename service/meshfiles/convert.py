@@ -8,15 +8,19 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
+import numpy as np
 
 from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.model.session import Model
+from pns_common.schemes import Scheme
 
 from ..bodies.folder import folder_of
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
@@ -25,15 +29,20 @@ from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import Media, read_upload
-from ..gltf.subdivide import make_scheme, subdivide_gltf
+from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
 from .flatten import flatten
 from .formats import FORMATS, held
-from .refine_mesh_file import check_cost, refine_mesh_file
+from .mesh_file import NORMAL, MeshFile
+from .parts import with_group_normals
+from .polygons import refine_polygons
+from .polygons_glb import polygons_glb
+from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
 from .to_gltf import as_gltf, read_within
 from .triangles_glb import as_gltf_json
+from .triangulate import triangulated
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -50,7 +59,7 @@ class Jobs:
     Attributes:
         sources: files to read; `-` is stdin.
         output: a file, a folder for files with the names of their sources, or `-` for stdout.
-        report: where the report of one source goes.
+        report, map: where the report of one source goes, and the parents of its new vertices.
         target: the format of all results; None: as `output` ends, or as read.
         kind: the format of stdin; None: glTF.
         force: whether a result may replace its source.
@@ -59,6 +68,7 @@ class Jobs:
     sources: Sequence[Path]
     output: Path
     report: Path | None = None
+    map: Path | None = None
     target: str | None = None
     kind: str | None = None
     force: bool = False
@@ -87,11 +97,11 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
 
     planned = _planned(jobs)
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
-    loaded = load_model(model) if options.scheme == "pns" or model is not None else None
+    loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     for job in planned:
         try:
-            _convert_one(job, jobs.report, options, loaded, limits, console)
+            _convert_one(job, jobs, options, loaded, limits, console)
         except InvalidParameter as error:
             yield error
         except (ServiceError, PnsError) as error:
@@ -103,7 +113,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
 
 def _convert_one(
     job: _Job,
-    report_file: Path | None,
+    jobs: Jobs,
     options: Options,
     model: Model | None,
     limits: Limits,
@@ -115,15 +125,27 @@ def _convert_one(
     else:
         data, siblings = job.source.read_bytes(), folder_of(job.source)
     with _progress(console) as course:
-        written = converted(data, job.kind, job.target, options, model, limits, course, siblings)
+        written = converted(
+            data,
+            job.kind,
+            job.target,
+            options,
+            model,
+            limits,
+            course,
+            siblings,
+            traced=jobs.map is not None,
+        )
     if job.output == STREAM:
         sys.stdout.buffer.write(written.content)
         sys.stdout.buffer.flush()
     else:
         replace_file(job.output, written.content)
-    if report_file is not None:
+    if jobs.map is not None and written.parents is not None:
+        replace_file(jobs.map, _as_npz(written.parents))
+    if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
-        replace_file(report_file, text + b"\n")
+        replace_file(jobs.report, text + b"\n")
     for line in (*lines_of(written.report), *advice_lines(written.report)):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
@@ -137,8 +159,9 @@ def _planned(jobs: Jobs) -> list[_Job]:
     into = jobs.output.is_dir() or (several and jobs.output != STREAM)
     if several and not jobs.output.is_dir():
         raise InvalidParameter("OUT", f"{jobs.output}: several files need a folder that is there")
-    if several and jobs.report is not None:
-        raise InvalidParameter("report", f"{jobs.report}: several files have several reports")
+    for name, file in (("report", jobs.report), ("map", jobs.map)):
+        if several and file is not None:
+            raise InvalidParameter(name, f"{file}: several files have several {name}s")
     planned: list[_Job] = []
     for source in jobs.sources:
         kind = jobs.kind or "glb" if source == STREAM else _kind("IN", source)
@@ -153,6 +176,10 @@ def _planned(jobs: Jobs) -> list[_Job]:
             ending = source.suffix if target == kind and source != STREAM else f".{target}"
             output = jobs.output / f"{stem}{ending}"
         _check_output(jobs, source, output)
+        if jobs.map is not None and {kind, target} & {*GLTF_KINDS}:
+            raise InvalidParameter(
+                "map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out"
+            )
         if any(output == job.output for job in planned):
             raise InvalidParameter("OUT", f"{output}: two files would be written to it")
         planned.append(_Job(source, kind, output, target))
@@ -160,11 +187,13 @@ def _planned(jobs: Jobs) -> list[_Job]:
 
 
 def _check_output(jobs: Jobs, source: Path, output: Path) -> None:
-    for name, file in (("OUT", output), ("report", jobs.report)):
+    beside = (("report", jobs.report), ("map", jobs.map))
+    for name, file in (("OUT", output), *beside):
         if file is not None and file != STREAM and not file.parent.is_dir():
             raise InvalidParameter(name, f"{file}: there is no folder {file.parent}")
-    if jobs.report is not None and jobs.report.resolve() in (source.resolve(), output.resolve()):
-        raise InvalidParameter("report", f"{jobs.report}: the report would replace a model")
+    for name, file in beside:
+        if file is not None and file.resolve() in (source.resolve(), output.resolve()):
+            raise InvalidParameter(name, f"{file}: the {name} would replace a model")
     if source != STREAM and output.resolve() == source.resolve() and not jobs.force:
         raise InvalidParameter("OUT", f"{output}: it is the input; --force replaces it")
 
@@ -178,41 +207,93 @@ def converted(
     limits: Limits,
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
+    *,
+    traced: bool = False,
 ) -> Written:
     """Refine the bytes of a file of `kind` into those of one of `target`; no file is touched.
+
+    `traced` asks for the parents of vertices, which no glTF has.
 
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
     course = Course() if course is None else course
-    if kind in GLTF_KINDS or target in GLTF_KINDS:
+    if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
-        sent = as_gltf(Sent(data, cast(Kind, kind), siblings), limits)
-        done = subdivide_gltf(
-            sent.data,
-            cast(Media, sent.kind),
-            options,
-            model,
-            limits,
-            course,
-            sent.siblings,
-            sent.losses,
-        )
-        return replace(_of_gltf(done.glb, done.report, target, limits), seconds=done.timings)
+        sent = Sent(data, cast(Kind, kind), siblings)
+        return _by_gltf(sent, target, options, model, limits, course)
     with course.stage("read", 0.0, 0.1):
-        mesh = read_within(data, kind, limits)
+        mesh, polygons = _taken(read_within(data, kind, limits), options, model)
+    if target in GLTF_KINDS and polygons is None:
+        sent = as_gltf(mesh, siblings, options)
+        return _by_gltf(sent, target, options, model, limits, course)
+    if target in GLTF_KINDS:
+        mesh = with_group_normals(mesh)
+        if NORMAL not in mesh.layers and options.normals == "auto":
+            options = replace(options, normals="smooth")
     with course.part(0.1, 0.8):
-        refined, report = refine_mesh_file(
-            mesh, make_scheme(options, model), options, limits, course
+        scheme = make_scheme(options, model) if polygons is None else polygons
+        refined, report = (refine_mesh_file if polygons is None else refine_polygons)(
+            mesh, scheme, options, limits, course, traced=traced
         )
     with course.stage("write", 0.8, 1.0):
+        if target in GLTF_KINDS:
+            glb, report = polygons_glb(refined, report, options, limits, siblings)
+            written = _of_gltf(glb, report, target, limits)
+            return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
         kept, changes = held(refined, target)
         if options.compress != "none":
             changes.append(Change("", "not compressed: only a glTF is", 1))
+        parents = kept.parents
+        if parents is not None and target == "stl":
+            parents = parents.take(kept.corners)
         written = Written(
-            FORMATS[target].write(kept), _with_changes(report, changes), len(kept.faces)
+            FORMATS[target].write(kept),
+            _with_changes(report, changes),
+            len(kept.sizes),
+            parents=parents,
         )
-    return replace(written, seconds=course.seconds)
+    return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
+
+
+def _by_gltf(
+    sent: Sent,
+    target: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course,
+) -> Written:
+    """Refine a glTF into a file of `target`."""
+    done = subdivide_gltf(
+        sent.data,
+        cast(Media, sent.kind),
+        options,
+        model,
+        limits,
+        course,
+        sent.siblings,
+        sent.losses,
+        sent.parts,
+    )
+    written = _of_gltf(done.glb, done.report, target, limits)
+    return replace(written, seconds=done.timings, faces_in=done.faces_in)
+
+
+def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:
+    """Return a file's mesh, and the scheme that refines its polygons; None: it is of triangles."""
+    flat = bool((mesh.sizes == 3).all())
+    if options.scheme == "catmull-clark" or not flat:
+        scheme = polygon_scheme(options, model)
+        wants = [name for name in ("material", "group") if getattr(options, name)]
+        if scheme is not None and not wants:
+            return mesh, scheme
+        if options.scheme == "catmull-clark":
+            raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
+        if scheme is not None:
+            told = Change("", f"polygons cut into triangles, which {wants[0]} needs", 1)
+            mesh = replace(mesh, changes=(*mesh.changes, told))
+    return triangulated(mesh), None
 
 
 def predicted_faces(
@@ -228,7 +309,7 @@ def predicted_faces(
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
     mesh = read_within(data, kind, limits)
     check_cost(mesh, options, limits)
-    return len(mesh.faces) * 4**options.levels
+    return faces_after(mesh, options.levels)
 
 
 def lines_of(report: dict[str, Any]) -> Iterator[str]:
@@ -275,12 +356,35 @@ def _check_kind(name: str, kind: str) -> None:
 
 @dataclass(frozen=True)
 class Written:
-    """An output file: its bytes, its report, its faces; the seconds that each stage took."""
+    """An output file.
+
+    Attributes:
+        content, report, faces: its bytes, its report, how many faces it has.
+        faces_in: how many the input has.
+        seconds: what each stage took.
+        parents: the vertices of the input that each of its vertices is made of, if asked for.
+    """
 
     content: bytes
     report: dict[str, Any]
     faces: int
     seconds: dict[str, float] = field(default_factory=dict)
+    faces_in: int = 0
+    parents: SubdivisionMatrix | None = None
+
+
+def _as_npz(parents: SubdivisionMatrix) -> bytes:
+    """Write a matrix as `scipy.sparse.load_npz` reads it."""
+    file = BytesIO()
+    np.savez_compressed(
+        file,
+        format=b"csr",
+        shape=parents.shape,
+        data=parents.weights,
+        indices=parents.columns,
+        indptr=parents.starts,
+    )
+    return file.getvalue()
 
 
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:

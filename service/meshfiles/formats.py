@@ -22,7 +22,7 @@ from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
 from .text import count_words
-from .triangulate import triangulated
+from .triangulate import fan, triangulated
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 
@@ -86,7 +86,12 @@ def memory_to_read(data: bytes, kind: str) -> int:
 
 
 def read(data: bytes, kind: str) -> MeshFile:
-    """Read a mesh file as triangles.
+    """Read a mesh file as triangles. Raises as `read_polygons`."""
+    return triangulated(read_polygons(data, kind))
+
+
+def read_polygons(data: bytes, kind: str) -> MeshFile:
+    """Read a mesh file with its polygons as they are.
 
     Raises:
         UnreadableError: not a file of this kind, or one without faces, or without all of them.
@@ -114,7 +119,7 @@ def read(data: bytes, kind: str) -> MeshFile:
     if unused:
         told = Change("", "vertices dropped that no face uses", unused)
         mesh = replace(mesh, changes=(*mesh.changes, told))
-    return triangulated(mesh)
+    return mesh
 
 
 def write(mesh: MeshFile, kind: str) -> bytes:
@@ -129,6 +134,7 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         UnrefinableError: a position beyond the range of float32, where that is all it holds.
     """
     form = FORMATS[kind]
+    mesh = triangulated(mesh) if kind == "stl" else mesh
     why = f" dropped: not written to {kind.upper()} files"
     layers, lost = dict(mesh.layers), dict[str, int]()
     for name, layer in mesh.layers.items():
@@ -177,14 +183,15 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    after = _without_area(mesh.vertices.astype(np.float32), mesh.faces)
+    faces = fan(mesh)
+    after = _without_area(mesh.vertices.astype(np.float32), faces)
     # Most meshes have no such face, and then none that rounding makes.
-    before = _without_area(mesh.vertices, mesh.faces) if after.any() else after
+    before = _without_area(mesh.vertices, faces) if after.any() else after
     rounding = "once positions are rounded to float32"
     told = {
         f"faces without an area {rounding}": int((after & ~before).sum()),
         f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
-            faces_too_far(mesh.vertices, mesh.faces)
+            faces_too_far(mesh.vertices, faces)
         ),
     }
     return [Change("", what, count) for what, count in told.items() if count]

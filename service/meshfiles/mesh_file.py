@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
+
+from pns_common.matrix import SubdivisionMatrix
 
 from ..report import Change
 
@@ -41,6 +43,10 @@ class Labels:
     names: tuple[str, ...]
     of_face: Int[np.ndarray, " F"]
 
+    def named(self, name: str) -> Bool[np.ndarray, " F"]:
+        """Return which faces have a name."""
+        return self.of_face == (self.names.index(name) if name in self.names else NONE - 1)
+
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
@@ -56,6 +62,7 @@ class MeshFile:
         libraries: files that define the materials.
         double: whether a format that has both is to store positions as doubles.
         changes: what the reader dropped or mended.
+        parents: of a refined mesh, the vertices of the file that each vertex is made of.
     """
 
     vertices: Float[np.ndarray, "V 3"]
@@ -67,6 +74,7 @@ class MeshFile:
     libraries: tuple[str, ...] = ()
     double: bool = False
     changes: tuple[Change, ...] = ()
+    parents: SubdivisionMatrix | None = None
 
     @property
     def sizes(self) -> Int[np.ndarray, " F"]:

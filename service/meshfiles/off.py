@@ -15,8 +15,11 @@ from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
 from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
 SIDES = "faces of fewer than three vertices"
-# The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0".
-_HEADER = re.compile(rb"\s*(?:#[^\n]*\n\s*)*(ST)?(C)?(N)?(4)?OFF(?:[ \t]+(BINARY))?")
+# The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0". Or they
+# stand alone: Geomview asks for no header.
+_HEADER = re.compile(
+    rb"\s*(?:#[^\n]*\n\s*)*(?:(ST)?(C)?(N)?(4)?OFF(?:[ \t]+(BINARY))?|(?=\d+[ \t]+\d+\s))"
+)
 _CUT_OFF = "the OFF file ends before its last face, or has none"
 
 
@@ -29,7 +32,7 @@ def read_off(data: bytes) -> MeshFile:
     data = plain_text(data)
     header = _HEADER.match(data)
     if header is None:
-        raise UnreadableError("this is not an OFF file: it does not begin with OFF")
+        raise UnreadableError("this is not an OFF file: it begins neither with OFF nor with counts")
     uv, colour, normal, w, binary = (group is not None for group in header.groups())
     if binary:
         raise UnreadableError("the OFF file is binary: only text is read")
@@ -50,7 +53,7 @@ def read_off(data: bytes) -> MeshFile:
     columns = np.split(table, np.cumsum([*widths.values()])[:-1], axis=1)
     parts = dict(zip(widths, columns, strict=True))
     sizes, corners, of_faces = _faces(text, at, face_count)
-    lost: dict[str, int] = {}
+    lost = {"fourth coordinates": int((parts["w"] != 1).sum())}
     if widths[COLOUR] not in (0, 3, 4):
         lost["values of vertices"] = vertex_count
         del parts[COLOUR]

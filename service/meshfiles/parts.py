@@ -8,19 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common.rows import cross, distinct_rows, number_by_first_appearance, unit
+from pns_common.matrix import SubdivisionMatrix
+from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
 
 from ..gltf.constants import FLOAT
 from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Accessor
 from ..gltf.refine.attributes import RefinedPrimitive
+from ..gltf.refine.selection import check_chosen
 from ..meshes.weld import canonical_zero
+from ..options import Options
 from ..report import Change
 from .mesh_file import (
     COLOUR,
+    GROUP,
     MATERIAL,
     NONE,
     NORMAL,
+    OBJECT,
     SMOOTHING,
     UV,
     Labels,
@@ -28,6 +33,7 @@ from .mesh_file import (
     MeshFile,
     of_triangles,
 )
+from .triangulate import area_vectors
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 LARGEST = float(np.finfo(np.float32).max)
@@ -49,15 +55,39 @@ class Part:
     material: int
 
 
-def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
-    """Divide triangles by material, in the order in which materials occur.
+def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None:
+    """Return which faces the options choose by their names; None where all are.
+
+    Raises:
+        UnrefinableError: none is chosen.
+    """
+    if not options.selects:
+        return None
+    chosen = np.ones(len(mesh.faces), dtype=bool)
+    wanted = ((options.material, (MATERIAL,)), (options.group, (GROUP, OBJECT)))
+    names: list[set[str]] = []
+    for name, kinds in wanted:
+        labels = [mesh.labels[kind] for kind in kinds if kind in mesh.labels]
+        names.append({each for label in labels for each in label.names})
+        if name is not None:
+            own = [label.named(name) for label in labels] or [np.zeros_like(chosen)]
+            chosen &= np.any(own, axis=0)
+    check_chosen(options, bool(chosen.any()), [*names[0]], names[1])
+    return chosen
+
+
+def parts_of(
+    mesh: MeshFile, chosen: Bool[np.ndarray, " F"] | None = None
+) -> tuple[list[Part], list[Change]]:
+    """Divide triangles by material, in the order in which materials occur, and by being chosen.
 
     A part has the layers that all of its corners have; what others lose is reported.
     """
     materials = mesh.labels.get(MATERIAL)
     count = len(mesh.faces)
     of_face = np.zeros(count, dtype=np.int64) if materials is None else materials.of_face + 1
-    order, first = number_by_first_appearance(of_face)
+    key = of_face if chosen is None else 2 * of_face + chosen
+    order, first = number_by_first_appearance(key)
     parts: list[Part] = []
     lost: dict[str, int] = {}
     for number, place in enumerate(first.tolist()):
@@ -122,6 +152,7 @@ def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:
     return replace(
         mesh,
         vertices=mesh.vertices[mesh.corners[first]],
+        parents=None if mesh.parents is None else mesh.parents.take(mesh.corners[first]),
         corners=row,
         layers={**mesh.layers, **kept},
     )
@@ -139,14 +170,12 @@ def with_group_normals(mesh: MeshFile) -> MeshFile:
     smooth = np.array([name.lower() not in _SMOOTH_OFF for name in groups.names] + [False])
     if not smooth.any():
         return mesh
-    faces, of_face = mesh.faces, groups.of_face
-    points = distinct_rows(canonical_zero(mesh.vertices))[faces]
-    label = np.where(smooth[of_face], of_face, len(groups.names) + np.arange(len(faces)))
-    corner = distinct_rows(np.stack([points.reshape(-1), np.repeat(label, 3)], axis=1))
-    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
-    by_area = cross(b - a, c - a)
-    count = int(corner.max()) + 1
-    sums = [np.bincount(corner, np.repeat(axis, 3), minlength=count) for axis in by_area.T]
+    of_face, sizes = groups.of_face, mesh.sizes
+    points = distinct_rows(canonical_zero(mesh.vertices))[mesh.corners]
+    label = np.where(smooth[of_face], of_face, len(groups.names) + np.arange(len(sizes)))
+    corner = distinct_rows(np.stack([points, np.repeat(label, sizes)], axis=1))
+    by_area, count = area_vectors(mesh), int(corner.max()) + 1
+    sums = [np.bincount(corner, np.repeat(axis, sizes), minlength=count) for axis in by_area.T]
     return replace(mesh, layers={**mesh.layers, NORMAL: Layer(unit(np.stack(sums, 1)), corner)})
 
 
@@ -156,6 +185,7 @@ def joined(
     kept: Sequence[Bool[np.ndarray, " F"]],
     refined: Sequence[RefinedPrimitive],
     levels: int,
+    parents: SubdivisionMatrix | None,
 ) -> MeshFile:
     """Return refined parts as one mesh, in the order of the file's faces.
 
@@ -165,15 +195,21 @@ def joined(
     control = np.concatenate(
         [of_part[p.source.number][0].faces[of_part[p.source.number][1]] for p in refined]
     )
-    order = np.argsort(control, kind="stable")
-    ranks = np.repeat(control[order], 4**levels)
+    counts = [
+        np.full(len(p.faces) // 4**levels, 4**levels) if p.counts is None else p.counts
+        for p in refined
+    ]
+    ranks = np.repeat(control, np.concatenate(counts))
+    order = slice(None) if len(refined) == 1 else np.argsort(ranks, kind="stable")
+    ranks = ranks[order]
 
     def ordered(rows: list[np.ndarray]) -> Int[np.ndarray, " C"]:
-        blocks = np.concatenate(rows).reshape(len(control), -1)
-        return (blocks if len(refined) == 1 else blocks[order]).reshape(-1)
+        return np.concatenate(rows)[order].reshape(-1)
 
     ids = [primitive.vertex for primitive in refined if primitive.vertex is not None]
-    vertices = np.zeros((1 + max(int(own.max()) for own in ids), 3))
+    used = np.flatnonzero(marked(np.concatenate(ids), 1 + max(int(own.max()) for own in ids)))
+    ids = [np.searchsorted(used, own) for own in ids]
+    vertices = np.empty((len(used), 3))
     for own, primitive in zip(ids, refined, strict=True):
         vertices[own] = primitive.attributes["POSITION"]
     corners = ordered([own[p.faces] for own, p in zip(ids, refined, strict=True)])
@@ -201,4 +237,5 @@ def joined(
         labels=labels,
         libraries=mesh.libraries,
         double=mesh.double,
+        parents=None if parents is None else parents.take(used),
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -113,10 +114,11 @@ def ply_header(data: bytes) -> PlyHeader:
                 elements[-1].properties.append(Property(name, _TYPES[kind]))
             case ["comment", "TextureFile", *_]:
                 textures += 1
-            case ["comment" | "obj_info", *_] | []:
-                pass
-            case _:
+            case ["format" | "element" | "property", *_]:
                 raise UnreadableError(f"line {number} of the PLY header: {line[:60]!r}")
+            case _:
+                # Comments, and what programs write without that word.
+                pass
     if order == "":
         raise UnreadableError("the PLY header names no format that is known")
     return PlyHeader(_ORDERS[order], elements, end.end(), textures)
@@ -248,94 +250,133 @@ def _text_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
     if len(numbers) != count_words(body):
         text = cut_text(body, "PLY", plain_text(data[: header.end]).count(b"\n"))
         numbers = text.numbers(np.arange(len(text.begins)))
+
+    def length(at: int, _: str) -> int:
+        return int(numbers[at])
+
+    def taken(places: Int[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
+        return _typed(numbers[places], kind)
+
+    return _tables(header, _Store(0, len(numbers), lambda _: 1, length, taken))
+
+
+def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
+    letters, order = np.frombuffer(data, dtype=np.uint8), header.order or "<"
+    names = {"<": "little", ">": "big"}
+
+    def length(at: int, kind: str) -> int:
+        if kind == "u1":
+            return data[at]
+        part = data[at : at + int(kind[1])]
+        return int.from_bytes(part, names[order], signed=kind[0] == "i")  # type: ignore[arg-type]
+
+    def taken(places: Int[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
+        width = int(kind[1])
+        step = int(places[1] - places[0]) if len(places) > 1 else width
+        if len(places) and places[-1] - places[0] == step * (len(places) - 1) and step >= width:
+            # Evenly spaced in most files: no index for each byte.
+            view = np.ndarray(len(places), order + kind, data, int(places[0]), (step,))
+            if (np.diff(places) == step).all():
+                return view.astype(kind)
+        parts = letters[places[:, None] + np.arange(width)].reshape(-1)
+        return parts.view(order + kind).astype(kind)
+
+    return _tables(header, _Store(header.end, len(data), lambda kind: int(kind[1]), length, taken))
+
+
+@dataclass(frozen=True)
+class _Store:
+    """Numbers to be read: words of a text, or bytes.
+
+    Attributes:
+        begin, end: the places of the first number and behind the last.
+        width: how many places a number of a type takes.
+        length: returns the length of a list, whose count is at a place.
+        taken: returns the numbers of a type at places.
+    """
+
+    begin: int
+    end: int
+    width: Callable[[str], int]
+    length: Callable[[int, str], int]
+    taken: Callable[[Int[np.ndarray, " N"], str], Shaped[np.ndarray, " N"]]
+
+
+def _tables(header: PlyHeader, store: _Store) -> dict[str, _Columns]:
     tables: dict[str, _Columns] = {}
-    at = 0
+    at = store.begin
     for element in header.elements:
-        columns, at = _text_columns(numbers, at, element)
-        tables[element.name] = columns
+        tables[element.name], at = _columns(element, at, store)
     return tables
 
 
-def _text_columns(
-    numbers: Shaped[np.ndarray, " N"], at: int, element: Element
-) -> tuple[_Columns, int]:
+def _columns(element: Element, at: int, store: _Store) -> tuple[_Columns, int]:
     """Read the rows of an element from a place on; return also where they end."""
-    lists = [one for one in element.properties if one.count_kind is not None]
-    if not lists or not element.rows:
-        width = len(element.properties)
-        rows = numbers[at : at + element.rows * width]
-        if len(rows) < element.rows * width:
-            raise _too_short(element, len(rows) // width)
-        table = rows.reshape(element.rows, width)
-        return {
-            one.name: _List(np.zeros(0, np.int64), np.zeros(0))
-            if one.count_kind is not None
-            else _typed(table[:, place], one.kind)
-            for place, one in enumerate(element.properties)
-        }, at + rows.size
-    # Where all lists are as long as the first row's, the rows are a table.
-    widths = _first_widths(numbers[at : at + 2**16], element)
-    if widths is not None and at + element.rows * sum(widths) <= len(numbers):
-        table = numbers[at : at + element.rows * sum(widths)].reshape(element.rows, -1)
-        begins = np.cumsum([0, *widths[:-1]])
-        of_lists = [
-            (place, width)
-            for place, width, one in zip(begins, widths, element.properties, strict=True)
-            if one.count_kind is not None
-        ]
-        if all((table[:, place] == width - 1).all() for place, width in of_lists):
-            columns: _Columns = {}
-            for place, width, one in zip(begins, widths, element.properties, strict=True):
-                if one.count_kind is None:
-                    columns[one.name] = _typed(table[:, place], one.kind)
-                else:
-                    inside = table[:, place + 1 : place + width].reshape(-1)
-                    sizes = np.full(element.rows, width - 1)
-                    columns[one.name] = _List(sizes, _typed(inside, one.kind))
-            return columns, at + table.size
-    return _text_rows(numbers, at, element)
-
-
-def _first_widths(numbers: Shaped[np.ndarray, " N"], element: Element) -> list[int] | None:
-    """Return how many numbers each property of the first row takes; None where it is cut off."""
-    widths: list[int] = []
-    for one in element.properties:
-        at = sum(widths)
-        if at >= len(numbers):
-            return None
-        count = numbers[at]
-        if one.count_kind is not None and not 0 <= count <= len(numbers):
-            return None
-        widths.append(1 if one.count_kind is None else 1 + int(count))
-    return widths
-
-
-def _text_rows(
-    numbers: Shaped[np.ndarray, " N"], at: int, element: Element
-) -> tuple[_Columns, int]:
-    """Read rows whose lists differ in length, one by one: each begins where another ends."""
-    sizes: list[list[int]] = [[] for _ in element.properties]
-    places: list[list[int]] = [[] for _ in element.properties]
-    total = len(numbers)
-    is_list = [one.count_kind is not None for one in element.properties]
-    for row in range(element.rows):
-        for number, several in enumerate(is_list):
-            count = 1
-            if at < total and several:
-                count = int(numbers[at]) if numbers[at] >= 0 else total
-                at += 1
-            if at + count > total:
-                raise _too_short(element, row)
-            places[number].append(at)
-            sizes[number].append(count)
-            at += count
+    begins, sizes, end = _places(element, at, store)
     columns: _Columns = {}
-    for number, one in enumerate(element.properties):
-        begins, counts = np.array(places[number]), np.array(sizes[number])
-        inside = np.repeat(begins - (np.cumsum(counts) - counts), counts)
-        values = _typed(numbers[inside + np.arange(len(inside))], one.kind)
-        columns[one.name] = values if one.count_kind is None else _List(counts, values)
-    return columns, at
+    for own, begin, size in zip(element.properties, begins, sizes, strict=True):
+        if own.count_kind is None:
+            columns[own.name] = store.taken(begin, own.kind)
+            continue
+        width = store.width(own.kind)
+        firsts = np.repeat(begin - width * (np.cumsum(size) - size), size)
+        columns[own.name] = _List(
+            size, store.taken(firsts + width * np.arange(len(firsts)), own.kind)
+        )
+    return columns, end
+
+
+def _places(
+    element: Element, at: int, store: _Store
+) -> tuple[list[Int[np.ndarray, " N"]], list[Int[np.ndarray, " N"]], int]:
+    """Return where each property's numbers begin in each row, how many, and where all end."""
+    widths = [store.width(own.kind) for own in element.properties]
+    heads = [0 if p.count_kind is None else store.width(p.count_kind) for p in element.properties]
+    own = list(zip(element.properties, widths, heads, strict=True))
+    rows, first = element.rows, _row(own, at, store) if element.rows else [1] * len(own)
+    if not own:
+        return [], [], at
+    if first is not None:
+        # Where all lists are as long as the first row's, all rows are.
+        spans = [head + width * size for (_, width, head), size in zip(own, first, strict=True)]
+        inside = np.cumsum([0, *spans])
+        whole = at + rows * int(inside[-1])
+        starts = at + int(inside[-1]) * np.arange(rows if whole <= store.end else 0)
+        if whole <= store.end and all(
+            kind.count_kind is None or (store.taken(starts + begin, kind.count_kind) == size).all()
+            for (kind, _, _), begin, size in zip(own, inside, first, strict=False)
+        ):
+            places = [starts + b + head for b, (_, _, head) in zip(inside, own, strict=False)]
+            return places, [np.full(rows, size) for size in first], whole
+    begins: list[list[int]] = [[] for _ in own]
+    sizes: list[list[int]] = [[] for _ in own]
+    # One by one: each row begins where another ends.
+    for row in range(rows):
+        found = _row(own, at, store)
+        if found is None:
+            raise _too_short(element, row)
+        for number, size in enumerate(found):
+            at += heads[number]
+            begins[number].append(at)
+            sizes[number].append(size)
+            at += widths[number] * size
+    return [np.array(b) for b in begins], [np.array(s) for s in sizes], at
+
+
+def _row(own: list[tuple[Property, int, int]], at: int, store: _Store) -> list[int] | None:
+    """Return how many numbers each property has in the row at a place; None if it is cut off."""
+    sizes: list[int] = []
+    for kind, width, head in own:
+        size = 1
+        if kind.count_kind is not None:
+            if at + head > store.end:
+                return None
+            size = store.length(at, kind.count_kind)
+        at += head + width * size
+        if size < 0 or at > store.end:
+            return None
+        sizes.append(size)
+    return sizes
 
 
 def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
@@ -352,135 +393,6 @@ def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " 
 def _too_short(element: Element, rows: int) -> UnreadableError:
     what = {"vertex": "vertices", "face": "faces"}.get(element.name, f"rows of {element.name}")
     return UnreadableError(f"the PLY file says {element.rows} {what} and ends after {rows}")
-
-
-def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
-    tables: dict[str, _Columns] = {}
-    at = header.end
-    for element in header.elements:
-        tables[element.name], at = _binary_columns(data, at, element, header.order or "<")
-    return tables
-
-
-def _binary_columns(data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int]:
-    """Read the rows of an element; rows of one size are a table."""
-    sizes: list[int] = []
-    begin = at
-    for one in element.properties:
-        if one.count_kind is None:
-            begin += int(one.kind[1])
-            continue
-        count = _count(data, begin, order + one.count_kind) if element.rows else 0
-        if count is None:
-            raise _too_short(element, 0)
-        sizes.append(count)
-        begin += int(one.count_kind[1]) + count * int(one.kind[1])
-    table = _table(data, at, element, order, sizes)
-    if table is None:
-        return _binary_rows(data, at, element, order)
-    columns: _Columns = {}
-    for place, one in enumerate(element.properties):
-        values = np.ascontiguousarray(table[f"v{place}"]).astype(one.kind)
-        if one.count_kind is None:
-            columns[one.name] = values
-        else:
-            lengths = np.full(element.rows, values.shape[1], dtype=np.int64)
-            columns[one.name] = _List(lengths, values.reshape(-1))
-    return columns, at + table.nbytes
-
-
-def _count(data: bytes, at: int, kind: str) -> int | None:
-    """Return the length of a list; None where the file ends before it."""
-    size = int(kind[2])
-    if size == 1 and kind[1] == "u":
-        return data[at] if at < len(data) else None
-    if at + size > len(data):
-        return None
-    order = "little" if kind[0] == "<" else "big"
-    return int.from_bytes(data[at : at + size], order, signed=kind[1] == "i")
-
-
-def _table(
-    data: bytes, at: int, element: Element, order: str, sizes: list[int]
-) -> Shaped[np.ndarray, " N"] | None:
-    """Return rows whose lists have these sizes as records; None where theirs differ."""
-    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    counts: list[tuple[str, int]] = []
-    left = iter(sizes)
-    if any(size < 0 or size > len(data) for size in sizes):
-        return None
-    for place, one in enumerate(element.properties):
-        if one.count_kind is None:
-            fields.append((f"v{place}", order + one.kind))
-            continue
-        size = next(left)
-        counts.append((f"n{place}", size))
-        fields.append((f"n{place}", order + one.count_kind))
-        fields.append((f"v{place}", order + one.kind, (size,)))
-    record = np.dtype(fields)
-    if at + element.rows * record.itemsize > len(data):
-        if not sizes:
-            raise _too_short(element, (len(data) - at) // max(record.itemsize, 1))
-        return None
-    table = np.frombuffer(data, record, element.rows, at) if record.itemsize else None
-    if table is None or any((table[name] != size).any() for name, size in counts):
-        return None
-    return table
-
-
-def _binary_rows(data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int]:
-    """Read rows whose lists differ in length, one by one: each begins where another ends."""
-    lists = [one for one in element.properties if one.count_kind is not None]
-    kinds = [(order + str(one.count_kind), int(one.kind[1])) for one in lists]
-    gaps = _gaps(element)
-    begins: list[list[int]] = [[] for _ in lists]
-    sizes: list[list[int]] = [[] for _ in lists]
-    total = len(data)
-    for row in range(element.rows):
-        for number, (count_kind, width) in enumerate(kinds):
-            at += gaps[number]
-            size = _count(data, at, count_kind)
-            if size is None or size < 0:
-                raise _too_short(element, row)
-            at += int(count_kind[2])
-            begins[number].append(at)
-            sizes[number].append(size)
-            at += size * width
-        at += gaps[-1]
-        if at > total:
-            raise _too_short(element, row)
-    letters = np.frombuffer(data, dtype=np.uint8)
-    columns: _Columns = {}
-    number, after, size = -1, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    for one in element.properties:
-        kind, width = np.dtype(order + one.kind), int(one.kind[1])
-        if one.count_kind is not None:
-            number += 1
-            begin, size = np.array(begins[number]), np.array(sizes[number])
-            firsts = np.repeat(begin - width * (np.cumsum(size) - size), size)
-            places = firsts + width * np.arange(len(firsts))
-            after = begin + width * size
-        elif number < 0:
-            first = np.array(begins[0]) - int(kinds[0][0][2]) - gaps[0]
-            places = first if not len(after) else after
-            after = places + width
-        else:
-            places, after = after, after + width
-        values = letters[places[:, None] + np.arange(width)].reshape(-1).view(kind)
-        values = values.astype(one.kind)
-        columns[one.name] = values if one.count_kind is None else _List(size, values)
-    return columns, at
-
-
-def _gaps(element: Element) -> list[int]:
-    """Return the bytes before each list of a row, and those behind the last."""
-    gaps = [0]
-    for one in element.properties:
-        if one.count_kind is None:
-            gaps[-1] += int(one.kind[1])
-        else:
-            gaps.append(0)
-    return gaps
 
 
 def write_ply(mesh: MeshFile) -> bytes:

@@ -25,15 +25,22 @@ from ..gltf.refine.meshes import refine_alone, stage_shares
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
 from .mesh_file import NORMAL, MeshFile
-from .parts import joined, parts_of, with_group_normals
+from .parts import chosen_of, joined, parts_of, with_group_normals
 
 
 def refine_mesh_file(
-    mesh: MeshFile, scheme: Scheme, options: Options, limits: Limits, course: Course | None = None
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    course: Course | None = None,
+    *,
+    traced: bool = False,
 ) -> tuple[MeshFile, dict[str, Any]]:
     """Refine triangles; return also the report.
 
-    `normals=auto` keeps normals, and adds none to a mesh without.
+    `normals=auto` keeps normals, and adds none to a mesh without. `traced` asks for the parents of
+    vertices.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
@@ -47,14 +54,21 @@ def refine_mesh_file(
     parts, incomplete = parts_of(shaded)
     plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
     primitives = [part.primitive for part in parts]
+    chosen = chosen_of(mesh, options)
+    own = None if chosen is None else [chosen[part.faces] for part in parts]
     shares = stage_shares(scheme, options)
     try:
-        made = refine_alone(plan, primitives, scheme, options, course, shares)
+        made = refine_alone(
+            plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
+        )
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")
-    refined = joined(mesh, parts, made.kept, made.refined, options.levels)
+    parents = made.parents
+    if parents is not None:
+        parents = replace(parents, shape=(parents.shape[0], len(mesh.vertices)))
+    refined = joined(mesh, parts, made.kept, made.refined, options.levels, parents)
     if NORMAL not in mesh.layers and options.normals == "keep":
         # Those that smoothing groups gave: these stay themselves.
         refined = replace(
@@ -82,9 +96,16 @@ def refine_mesh_file(
     return refined, build_report(scheme, options.levels, [result], unused, changes)
 
 
+def faces_after(mesh: MeshFile, levels: int) -> int:
+    """Return how many faces a mesh file becomes: four of a triangle, a quad for each corner."""
+    if (mesh.sizes == 3).all():
+        return len(mesh.sizes) * 4**levels
+    return len(mesh.corners) * 4 ** (levels - 1)
+
+
 def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
     """Check the refined faces and the memory that they will take. Raises LimitError."""
-    faces = len(mesh.faces) * 4**options.levels
+    faces = faces_after(mesh, options.levels)
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit

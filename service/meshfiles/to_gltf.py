@@ -8,40 +8,38 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.media import GLTF_KINDS
 from ..bodies.sibling_files import Opened, SiblingFiles
 from ..bodies.uploads import Sent
 from ..errors import UnrefinableError
 from ..gltf.read.plan import check_memory
-from ..options import Limits
+from ..options import Limits, Options
 from ..report import Change
 from . import formats
 from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
-from .parts import LARGEST, Part, parts_of, with_group_normals
+from .parts import LARGEST, Part, chosen_of, parts_of, with_group_normals
 from .triangles_glb import parts_glb
 
 
-def as_gltf(sent: Sent, limits: Limits) -> Sent:
-    """Return the same upload if it is a glTF; a converted GLB, and what that lost, if not.
+def as_gltf(
+    mesh: MeshFile, siblings: SiblingFiles, options: Options, *, ngons: bool = False
+) -> Sent:
+    """Return triangles as a GLB, and what that lost.
 
-    Materials are read from the libraries that came with the file, or lie beside it.
+    Materials are read from the libraries that came with the file, or lie beside it. `ngons` says
+    that the triangles of a polygon follow each other, around its first corner.
 
     Raises:
-        UnreadableError: not a file of its kind, or one without faces.
         UnrefinableError: a position that float32 cannot hold.
-        LimitError: reading would take more than `max_memory_bytes`.
     """
-    if sent.kind in GLTF_KINDS:
-        return sent
-    mesh = read_within(sent.data, sent.kind, limits)
     if np.abs(mesh.vertices[mesh.corners]).max() > LARGEST:
         raise UnrefinableError("a position is beyond the range of float32")
     changes = [*mesh.changes]
     mesh, lost = _with_colours_at_corners(with_group_normals(mesh))
-    parts, incomplete = parts_of(mesh)
-    opened = Opened(sent.siblings)
+    chosen = chosen_of(mesh, options)
+    parts, incomplete = parts_of(mesh, chosen)
+    opened = Opened(siblings)
     labels = mesh.labels.get(MATERIAL)
     names = () if labels is None else labels.names
     made = materials_of(names, mesh.libraries, opened)
@@ -54,19 +52,22 @@ def as_gltf(sent: Sent, limits: Limits) -> Sent:
     shown = [_shown(part, materials) for part in parts]
     if all(part.material != len(materials) - 1 for part in shown):
         materials.pop()
-    glb = parts_glb(shown, materials, made.images)
-    siblings = SiblingFiles(sent.siblings.find, frozenset(opened.unused), sent.siblings.folder)
+    glb = parts_glb(shown, materials, made.images, ngons=ngons)
+    siblings = SiblingFiles(siblings.find, frozenset(opened.unused), siblings.folder)
     changes += [*lost, *incomplete, *_labels_lost(mesh), *rounding_changes(mesh)]
-    return Sent(glb, "glb", siblings, losses=tuple(changes))
+    refined = None
+    if chosen is not None:
+        refined = frozenset(p.primitive.number for p in parts if chosen[p.faces[0]])
+    return Sent(glb, "glb", siblings, tuple(changes), refined)
 
 
 def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
     """Read a mesh file, if reading takes no more memory than it may.
 
-    Raises as `formats.read`, and LimitError.
+    Raises as `formats.read_polygons`, and LimitError.
     """
     check_memory(formats.memory_to_read(data, kind), limits)
-    return formats.read(data, kind)
+    return formats.read_polygons(data, kind)
 
 
 def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:

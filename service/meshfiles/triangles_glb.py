@@ -25,6 +25,7 @@ from .mesh_file import COLOUR, NONE, NORMAL, UV, MeshFile
 from .parts import Part, parts_of
 
 _TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items() if number != UNSIGNED_INT}
+NGONS = "FB_ngon_encoding"
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -47,8 +48,13 @@ def parts_glb(
     materials: Sequence[dict[str, Any]],
     images: Sequence[str],
     extras: dict[str, Any] | None = None,
+    *,
+    ngons: bool = False,
 ) -> bytes:
-    """Write parts, whose materials are numbers of `materials`; `images` are URIs."""
+    """Write parts, whose materials are numbers of `materials`; `images` are URIs.
+
+    `ngons` marks them with FB_ngon_encoding.
+    """
     asset: dict[str, Any] = {"version": "2.0", "generator": "pns"}
     if extras:
         asset["extras"] = extras
@@ -74,7 +80,11 @@ def parts_glb(
         }
         if part.material != NONE:
             primitive["material"] = part.material
+        if ngons:
+            primitive["extensions"] = {NGONS: {}}
         tree["meshes"][0]["primitives"].append(primitive)
+    if ngons:
+        tree["extensionsUsed"] = [NGONS]
     tree["buffers"] = [{"byteLength": sum(map(len, pieces))}]
     if materials:
         tree["materials"] = list(materials)

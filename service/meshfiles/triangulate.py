@@ -60,6 +60,14 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     )
 
 
+def fan(mesh: MeshFile) -> Int[np.ndarray, "T 3"]:
+    """Return the vertices of triangles around the first corner of each polygon."""
+    pieces = mesh.sizes - 2
+    first = np.repeat(mesh.offsets[:-1], pieces)
+    step = 1 + np.arange(len(first)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return mesh.corners[np.stack([first, first + step, first + step + 1], axis=1)]
+
+
 def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
     """Cut polygons some at a time: what that takes is many times what is left."""
     sizes = mesh.sizes
@@ -138,6 +146,12 @@ def cut_polygons(
         order = np.argsort(polygon, kind="stable")
         places, polygon = places[order], polygon[order]
     return Cut(places, polygon, crossed)
+
+
+def area_vectors(mesh: MeshFile) -> Float[np.ndarray, "F 3"]:
+    """Return twice the area of each polygon along its normal."""
+    points = mesh.vertices[mesh.corners]
+    return _newell(points - points[np.repeat(mesh.offsets[:-1], mesh.sizes)], mesh.offsets)
 
 
 def _newell(

@@ -108,7 +108,7 @@ def model_hash(batch: Batch) -> str | None:
         NoModelError: there is no such model, or it cannot be used.
         InvalidParameter: it is of no use with these options.
     """
-    if batch.options.scheme != "pns":
+    if not batch.options.learns:
         return None
     from pns_common import ModelError, load_model
 

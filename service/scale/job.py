@@ -138,7 +138,7 @@ def _refine(task: Task) -> Row:
     digest = input_hash(data, task.kind, siblings, task.limits)
     if _is_done(task.known, digest, output):
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
-    model = _model(task.model) if task.options.scheme == "pns" else None
+    model = _model(task.model) if task.options.learns else None
     check_same_model(task.model, None if model is None else model.hash, task.model_hash)
     try:
         with memory_cap(task.limits.max_memory_bytes):
@@ -168,7 +168,7 @@ def _refine(task: Task) -> Row:
         task.output,
         DONE,
         changes="\n".join(lines_of(written.report))[:LONGEST],
-        faces_in=written.faces // 4**task.options.levels,
+        faces_in=written.faces_in,
         faces_out=written.faces,
         bytes_in=len(data),
         bytes_out=len(written.content),

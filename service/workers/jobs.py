@@ -27,8 +27,6 @@ from .progress import Reporter
 if TYPE_CHECKING:
     from pns_common.model.session import Model
 
-    from ..bodies.uploads import Sent
-    from ..meshfiles.convert import Written
     from .catalogue import Catalogue
 
 log = logging.getLogger("pns.service")
@@ -86,51 +84,34 @@ def subdivide(work: Work) -> Done:
     import msgspec
 
     from ..bodies import uploads
+    from ..meshfiles.convert import converted
 
     with Reporter(work.page) as reporter, job_memory(work.limits):
         sent = uploads.sent(_body_of(work), work.content_type, work.limits)
-        model = _MODELS.get(work.model) if work.options.scheme == "pns" else None
+        model = _MODELS.get(work.model) if work.options.learns else None
         course = Course(begins=reporter.stage, moves=reporter.reach)
-        written = _refined(work, sent, model, course)
+        written = converted(
+            sent.data,
+            sent.kind,
+            work.target,
+            work.options,
+            model,
+            work.limits,
+            course,
+            sent.siblings,
+        )
         report = msgspec.json.encode(written.report)
         _check_answer(work, report, written.content)
         if work.report is not None:
             memory_file.write(work.report, report)
         if work.answer is not None:
             memory_file.write(work.answer, written.content)
-    faces = written.report["totals"]["faces"]
     return Done(
         written.seconds,
         None if model is None else model.name,
-        faces_in=faces // 4**work.options.levels,
-        faces=faces,
+        faces_in=written.faces_in,
+        faces=written.report["totals"]["faces"],
     )
-
-
-def _refined(work: Work, sent: Sent, model: Model | None, course: Course) -> Written:
-    """Refine a file into one of the kind that is wanted."""
-    from ..gltf.subdivide import subdivide_gltf
-    from ..meshfiles.convert import Written, converted
-    from ..meshfiles.to_gltf import as_gltf
-
-    options, limits = work.options, work.limits
-    if work.target != "glb":
-        siblings = sent.siblings
-        return converted(
-            sent.data, sent.kind, work.target, options, model, limits, course, siblings
-        )
-    sent = as_gltf(sent, limits)
-    done = subdivide_gltf(
-        sent.data,
-        sent.kind,  # pyright: ignore[reportArgumentType]  (as_gltf gives no other)
-        options,
-        model,
-        limits,
-        course=course,
-        siblings=sent.siblings,
-        losses=sent.losses,
-    )
-    return Written(done.glb, done.report, done.report["totals"]["faces"], done.timings)
 
 
 def measure(work: Work) -> Cost:
@@ -165,7 +146,7 @@ def _learned_levels(work: Work) -> int:
     """Return at how many levels a model acts: all in format 1, one in format 4."""
     from pns_common.model.card import PAPER_FORMAT
 
-    if work.options.scheme != "pns":
+    if not work.options.learns:
         return 0
     try:
         card = _MODELS.get(work.model).card

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Creases, Mesh, ParameterError, loop, refine, sharp_edges
+from pns_common import Creases, Mesh, ParameterError, load_model, loop, pns, refine, sharp_edges
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
-from pns_common.topology import build_topology
+from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import bumpy_sphere, grid, manifolds, prism, soups
 
 seeds = st.integers(0, 2**31)
@@ -138,3 +138,37 @@ def test_a_prism_keeps_its_rims():
     heights = mesh.vertices[found][:, :, 2]
     assert len(found) == 24
     assert (heights[:, 0] == heights[:, 1]).all()
+
+
+def border_points(mesh, border, scheme):
+    made = refine(mesh, scheme, 2, creases=None, border=border, limit=True)
+    return made.mesh.vertices
+
+
+@pytest.mark.parametrize("scheme", [loop(), pns(load_model())], ids=["loop", "pns"])
+def test_a_fixed_border_stays_as_it_is_and_corners_are_vertices_of_one_face(scheme):
+    vertices, faces = grid(4, lambda x, y: x * x + x * y * y)
+    mesh = Mesh(vertices, faces)
+    topology = build_topology(faces, len(vertices))
+    ends = topology.edges[topology.edge_class == EdgeClass.BOUNDARY]
+    alone = np.flatnonzero(np.bincount(faces.reshape(-1)) == 1)
+    rim = np.unique(ends)
+    moved = {
+        border: border_points(mesh, border, scheme) for border in ("smooth", "corners", "fixed")
+    }
+    still = {b: (points[rim] == vertices[rim]).all(axis=1) for b, points in moved.items()}
+    assert len(alone) == 2
+    assert not still["smooth"][np.isin(rim, alone)].any()
+    assert rim[still["corners"]].tolist() == alone.tolist()
+    assert still["fixed"].all()
+    # The middles of the border's edges and of their halves lie on them, evenly.
+    refined = Mesh(moved["fixed"], refine(mesh, scheme, 2, creases=None).mesh.faces)
+    a, b = vertices[ends[:, :1]], vertices[ends[:, 1:]]
+    wanted = np.concatenate([a + (b - a) * t / 4 for t in (1, 2, 3)]).reshape(-1, 3)
+    found = {tuple(row) for row in np.round(refined.vertices, 9).tolist()}
+    assert {tuple(row) for row in np.round(wanted, 9).tolist()} <= found
+
+
+def test_another_border_is_refused():
+    with pytest.raises(ParameterError):
+        Creases(border="round")

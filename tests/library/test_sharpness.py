@@ -233,3 +233,28 @@ def test_the_whole_rule_does_not_depend_on_how_a_mesh_is_seen(mesh, seed):
     ):
         made = refine(twin.mesh, scheme, 1).mesh.vertices[twin.place]
         np.testing.assert_allclose(made * back, expected, atol=1e-9)
+
+
+@given(manifolds(), seeds)
+def test_soft_edges_keep_the_promises_of_a_guarded_and_bounded_step(mesh, seed):
+    """Ratio, turns of neighbours and distance from smooth Loop, whatever the networks say."""
+    scheme = pns(sharpening_model(seed % 7, scale=5.0, fold_angle=50.0))
+    made = refine(mesh, scheme, 1)
+    assert made.ratio.max() <= 1 + 1e-12
+    parent = made.topologies[0]
+    base = LOOP.place(mesh.vertices, parent, Blocks())
+    before, after = (turns_of(base, made.mesh), turns_of(made.mesh.vertices, made.mesh))
+    assert (after <= before + np.radians(2 * 50.0) + 1e-6).all()
+    ours, theirs = refine(mesh, scheme, 2, limit=True), refine(mesh, loop(), 2, limit=True)
+    apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
+    assert apart <= ours.report["limit_distance"] * (1 + 1e-9) + 1e-12
+
+
+def turns_of(points, mesh):
+    """Angles between neighbours."""
+    topology = mesh.topology()
+    sides = topology.half_edges[topology.interior] // 3
+    a, b, c = (points[mesh.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    n, m = (normals[sides[:, k]] for k in (0, 1))
+    return np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), (n * m).sum(axis=1))

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 from service.bodies import uploads
 from service.gltf.read.container import read_glb
-from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.convert import converted
 from service.meshfiles.formats import write
-from service.meshfiles.to_gltf import as_gltf
 from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.soak.bodies import a_part, small_body
@@ -60,13 +59,9 @@ def small_sample() -> Sample:
 def _sample(name: str, content_type: str, body: bytes) -> Sample:
     options = Options(levels=1, scheme="loop")
     limits = Limits()
-    sent = as_gltf(uploads.sent(body, content_type, limits), limits)
-    if sent.kind not in ("glb", "gltf"):
-        raise ValueError(f"{name} is {sent.kind}, which no stage turns into glTF")
-    done = subdivide_gltf(
-        sent.data, sent.kind, options, None, limits, siblings=sent.siblings, losses=sent.losses
-    )
-    digest = hashlib.sha256(done.glb).hexdigest()
+    sent = uploads.sent(body, content_type, limits)
+    done = converted(sent.data, sent.kind, "glb", options, None, limits, siblings=sent.siblings)
+    digest = hashlib.sha256(done.content).hexdigest()
     return Sample(name, "levels=1&scheme=loop", content_type, body, digest)
 
 

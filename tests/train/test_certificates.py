@@ -27,6 +27,7 @@ from train.certificates.learned_once import (
     fold_free,
     largest_turn,
     limit_distance,
+    neighbour_turns,
     resolution_independence,
     smoothness_class,
 )
@@ -207,7 +208,10 @@ def test_plain_loop_keeps_the_creases_that_the_operator_keeps(body):
 
 # The default's certificates: schemes that correct once, and are Loop afterwards.
 
-ONCE = (fold_free, limit_distance, smoothness_class, resolution_independence)
+ONCE = (
+    *(fold_free, neighbour_turns, limit_distance),
+    *(smoothness_class, resolution_independence),
+)
 
 
 def default_subject(scale=2.0, seed=0, **changes):
@@ -228,6 +232,18 @@ def with_rule(subject, **changes):
 def test_any_weights_pass_what_is_promised_of_correcting_once(certificate, scale):
     result = certificate(default_subject(scale), ROUGH)
     assert result.passed, (result.value, result.where)
+
+
+@pytest.mark.parametrize("certificate", ONCE)
+def test_any_sharpness_network_passes_too(certificate):
+    result = certificate(default_subject(sharpness_features="crease-53"), ROUGH)
+    assert result.passed, (result.value, result.where)
+
+
+def test_any_sharpness_network_keeps_motions_and_planes():
+    subject = default_subject(sharpness_features="crease-53")
+    assert not failed(equivariance(subject, BODIES[:2], 0))
+    assert not failed(affine_reproduction(subject, flat_bodies(0), 0))
 
 
 @pytest.mark.parametrize("theorem", ["T1", "T3", "T4"])
@@ -268,7 +284,7 @@ def test_a_scheme_that_corrects_at_every_level_has_no_class():
     assert not smoothness_class(every, BODIES[:1]).passed
     assert [step.theorem for step in scheme_steps(every, (), 0, (3,))][-1] == "stars"
     once = [step.theorem for step in scheme_steps(default_subject(), (), 0, (3,))]
-    assert once[-4:] == ["folds", "limit", "class", "scale"]
+    assert once[-5:] == ["folds", "turns", "limit", "class", "scale"]
 
 
 def test_a_scheme_that_goes_on_past_its_level_is_found():

@@ -68,7 +68,7 @@ def test_the_rims_of_a_drum_are_sharp_and_its_sides_are_not(known):
 
 
 def test_edges_beside_a_sharp_one_are_not_sharp():
-    """A box whose faces are bands: the truth's edges alone, though bands are as near as they are."""
+    """Bands beside a rim: the rim alone, though the bands' edges are as near as the reach."""
     shape = np.array([[1.0, 0], [1, 1], [1, 1.05], [1, 1.1], [0, 1.1]])
     coarse = turned(shape, 16, BOTH)
     fine = turned(shape, 176, BOTH)

@@ -50,7 +50,7 @@ def _off_loop(subject: Subject, mesh: Mesh, axis: int) -> float:
     first level.
     """
     refined, base = (
-        refine(mesh, rules, LEVELS, 1.0, creases=None).mesh.vertices
+        refine(mesh, rules, LEVELS, 1.0, creases="auto").mesh.vertices
         for rules in (subject.scheme, loop_like(subject.scheme))
     )
     if not subject.moves_curves:

@@ -20,6 +20,7 @@ from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
     fold_free,
     limit_distance,
+    neighbour_turns,
     resolution_independence,
     smoothness_class,
 )
@@ -127,6 +128,7 @@ def _steps_of_kind(
     rough = (*bodies, Body("spiky sphere", spiky_sphere(seed)))
     return [
         Step("folds", "fold-free", lambda: fold_free(subject, rough, seed)),
+        Step("turns", "turns of neighbours", lambda: neighbour_turns(subject, rough, seed)),
         Step("limit", "limit distance", lambda: limit_distance(subject, rough, seed)),
         Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
         Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),

@@ -57,8 +57,8 @@ def discrepancy(
     scheme: AnyScheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
     """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
-    still = step(scheme, mesh)
-    moved = step(scheme, Mesh(mesh.vertices @ turn.T + shift, mesh.faces))
+    still = step(scheme, mesh, "auto")
+    moved = step(scheme, Mesh(mesh.vertices @ turn.T + shift, mesh.faces), "auto")
     apart = np.linalg.norm(moved.positions - (still.positions @ turn.T + shift), axis=1)
     kept = ~(still.degenerate | moved.degenerate)
     kept[len(mesh.vertices) :] &= well_conditioned(mesh)

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pns_common import Creases, Mesh, Scheme, loop
 from pns_common import refine as refine_by_library
@@ -18,6 +18,7 @@ from train.certificates.bodies import Body
 from train.certificates.plain_loop import plain_loop
 from train.certificates.step import rounding, step, trials
 from train.certificates.subject import Certificate, Subject, worst
+from train.connectivity import connect
 from train.refining import AnyScheme, refine
 
 # Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
@@ -46,21 +47,68 @@ def fold_free(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certif
     return Certificate("folds", "fold-free", turn, high=angle + ROUNDING_ANGLE, where=place)
 
 
+def neighbour_turns(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
+    """Certify that no two neighbouring child faces turn by more than 2 θ beyond Loop's pair.
+
+    The value is the largest excess in degrees. It follows from `fold_free` by the triangle
+    inequality on the sphere of normals.
+    """
+    card = subject.learned_once
+    angle = math.nan if card is None or card.fold_angle is None else card.fold_angle
+    measured = []
+    for trial in trials(subject, bodies, seed):
+        base = plain_loop(trial.mesh.vertices, trial.mesh.faces, trial.creases).positions
+        made = step(subject.scheme, trial.mesh, creases=trial.creases)
+        faces = made.level.split().numpy()
+        children = connect(faces, len(base))
+        pairs = (children.half_edges[children.paired] // 3).numpy()
+        measured.append((largest_excess(faces, pairs, base, made.positions), trial.name))
+    excess, place = worst(measured)
+    high = 2 * (angle + ROUNDING_ANGLE)
+    return Certificate("turns", "turns of neighbours", excess, high=high, where=place)
+
+
+def largest_excess(
+    faces: Int[np.ndarray, "F 3"],
+    pairs: Int[np.ndarray, "N 2"],
+    before: Float[np.ndarray, "V 3"],
+    after: Float[np.ndarray, "V 3"],
+) -> float:
+    """Return by how much an angle between two faces' normals grew at most, in degrees.
+
+    Pairs with a face that had no area before are left out. 180 for NaN.
+    """
+    vectors, defined = _area_vectors(faces, before, after)
+    old, new = (_angle(*vector[pairs].transpose(1, 0, 2)) for vector in vectors)
+    grown = (new - old)[defined[pairs].all(axis=1)]
+    return float(np.max(np.where(np.isnan(grown), 180.0, grown), initial=0.0))
+
+
 def largest_turn(
     faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
 ) -> float:
     """Return the largest angle of a face's normals before and after, in degrees; 180 for NaN."""
+    vectors, defined = _area_vectors(faces, before, after)
+    angle = _angle(*vectors)[defined]
+    return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
+
+
+def _area_vectors(
+    faces: Int[np.ndarray, "F 3"], before: Float[np.ndarray, "V 3"], after: Float[np.ndarray, "V 3"]
+) -> tuple[list[Float[np.ndarray, "F 3"]], Bool[np.ndarray, " F"]]:
+    """Return area vectors before and after, and which faces have an area before."""
     vectors, longest = [], []
     for points in (before, after):
         a, b, c = points[faces].transpose(1, 0, 2)
         vectors.append(np.cross(b - a, c - a))
         longest.append(np.maximum(np.sum((b - a) ** 2, axis=1), np.sum((c - a) ** 2, axis=1)))
-    size = [np.linalg.norm(vector, axis=1) for vector in vectors]
-    defined = size[0] > FLAT * longest[0]
-    # An arctangent: an arc cosine would round small angles away.
-    sine = np.linalg.norm(np.cross(*vectors), axis=1)[defined]
-    angle = np.degrees(np.arctan2(sine, np.sum(vectors[0] * vectors[1], axis=1)[defined]))
-    return float(np.max(np.where(np.isnan(angle), 180.0, angle), initial=0.0))
+    return vectors, np.linalg.norm(vectors[0], axis=1) > FLAT * longest[0]
+
+
+def _angle(u: Float[np.ndarray, "N 3"], v: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
+    """Return angles in degrees by an arctangent: an arc cosine would round small ones away."""
+    sine = np.linalg.norm(np.cross(u, v), axis=1)
+    return np.degrees(np.arctan2(sine, np.sum(u * v, axis=1)))
 
 
 def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Literal
 
 import numpy as np
 import torch
@@ -49,10 +50,19 @@ class Step:
         return np.where(apart <= rounding(self.mesh), self.ratio * envelope, apart)
 
 
-def step(scheme: AnyScheme, mesh: Mesh, creases: Int[np.ndarray, "N 2"] | None = None) -> Step:
-    """Apply a scheme once, at reference length 1; ``creases`` are edges to be kept sharp."""
+def step(
+    scheme: AnyScheme,
+    mesh: Mesh,
+    creases: Int[np.ndarray, "N 2"] | Literal["auto"] | None = None,
+) -> Step:
+    """Apply a scheme once, at reference length 1.
+
+    ``creases`` are edges to be kept sharp; "auto": the scheme's own, which `Step.level` does not
+    know.
+    """
     refined = refine(mesh, scheme, 1, 1.0, creases=creases)
-    level = connect(mesh.faces, len(mesh.vertices), creases)
+    named = None if isinstance(creases, str) else creases
+    level = connect(mesh.faces, len(mesh.vertices), named)
     return Step(mesh, refined.mesh.vertices, refined.ratio, level)
 
 

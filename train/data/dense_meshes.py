@@ -1,7 +1,5 @@
-"""Dense meshes to simplify: files in a folder, subdivided control meshes, and CAD-like parts."""
+"""Meshes that files hold: welded, cleaned, and the largest part of each."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,52 +7,13 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pns_common import Mesh, MeshError, clean, loop
+from pns_common import Mesh, MeshError, clean
 from train.connectivity import connect
-from train.data.parts import CAD_PARTS
-from train.refining import refine
 
 # .npz: arrays `vertices` and `faces`.
 FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")
-# A file whose stem ends so holds a control mesh, to be subdivided.
+# A file whose stem ends so holds a control mesh.
 CONTROL_ENDING = "_control_mesh"
-
-CONTROL_LEVELS = 3
-FEWEST_FACES = 900
-
-ASSET, CONTROL, CAD = "file", "control mesh", "CAD part"
-
-
-@dataclass(frozen=True, slots=True)
-class DenseMesh:
-    """A dense mesh: one manifold part without degenerate faces.
-
-    Attributes:
-        name: the file's name, or the part's.
-        kind: ASSET, CONTROL or CAD.
-    """
-
-    name: str
-    kind: str
-    mesh: Mesh
-
-    @property
-    def title(self) -> str:
-        """What the mesh is called in figures."""
-        return self.name.partition(".")[0].removesuffix(CONTROL_ENDING)
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """A file that is not in the test, and why."""
-
-    name: str
-    reason: str
-
-
-def cad_meshes(fineness: int = 1) -> list[DenseMesh]:
-    """Return every part of `train.data.parts`; with fineness n, of n² times the faces."""
-    return [DenseMesh(name, CAD, make(fineness)) for name, make in CAD_PARTS.items()]
 
 
 def asset_files(folder: Path) -> list[Path]:
@@ -63,34 +22,6 @@ def asset_files(folder: Path) -> list[Path]:
         (path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in FORMATS),
         key=lambda path: path.name.lower(),
     )
-
-
-def asset_meshes(folder: Path) -> Iterator[DenseMesh | LeftOut]:
-    """Yield for each mesh file its dense mesh, or why there is none."""
-    for path in asset_files(folder):
-        yield dense_asset(path)
-
-
-def dense_asset(path: Path) -> DenseMesh | LeftOut:
-    """Return the largest manifold part of a file, welded by position; subdivided if a control mesh.
-
-    A part is what hangs together across interior edges, so that a mesh is cut along edges of three
-    faces or more.
-    """
-    try:
-        part = largest_part(read_mesh(path))
-    except MeshError as error:
-        return LeftOut(path.name, error.reason)
-    kind = CONTROL if path.stem.endswith(CONTROL_ENDING) else ASSET
-    if kind == CONTROL:
-        part = refine(part, loop(), CONTROL_LEVELS).mesh
-    if not is_manifold(part):
-        return LeftOut(path.name, "its largest part is no manifold")
-    if len(part.faces) < FEWEST_FACES:
-        return LeftOut(path.name, f"faces of its largest part: {len(part.faces)}")
-    if np.linalg.matrix_rank(part.vertices - part.vertices[0]) < 3:
-        return LeftOut(path.name, "it lies in a plane, where every scheme stays")
-    return DenseMesh(path.name, kind, part)
 
 
 def welded(mesh: Mesh) -> Mesh:

@@ -7,6 +7,7 @@ its kind.
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import fast_simplification
 import numpy as np
@@ -34,8 +35,12 @@ CLUSTERED = 8
 # Target length over that of as many equilateral triangles, at first.
 EVEN = 1.15
 
-# Of isotropic remeshing, each time with a length corrected by the last result's faces.
-TRIES, ITERATIONS = 2, 5
+# Of isotropic remeshing, done twice: the second length is corrected by the first result's faces.
+ITERATIONS = 5
+
+# Libraries without types.
+meshlab: Any = pymeshlab
+vtk: Any = pyvista
 
 Simplifier = Callable[[Mesh, int], Mesh]
 
@@ -60,7 +65,7 @@ def meshlab_vertices(mesh: Mesh, faces: int) -> Mesh:
 
 def vtk_quadric(mesh: Mesh, faces: int) -> Mesh:
     """Collapse edges by quadrics with VTK's own placement (vtkQuadricDecimation)."""
-    done = pyvista.make_tri_mesh(mesh.vertices, mesh.faces).decimate(1 - faces / len(mesh.faces))
+    done = vtk.make_tri_mesh(mesh.vertices, mesh.faces).decimate(1 - faces / len(mesh.faces))
     return _mesh(done.points, done.regular_faces)
 
 
@@ -72,11 +77,11 @@ def centroidal(mesh: Mesh, faces: int) -> Mesh:
     with warnings.catch_warnings():
         # pyacvd reads PyVista's arrays by their old names.
         warnings.simplefilter("ignore", PyVistaDeprecationWarning)
-        clusters = pyacvd.Clustering(pyvista.make_tri_mesh(mesh.vertices, mesh.faces))
+        clusters = pyacvd.Clustering(vtk.make_tri_mesh(mesh.vertices, mesh.faces))
         if splits:
             clusters.subdivide(splits)
         clusters.cluster(count)
-        done = clusters.create_mesh()
+        done: Any = clusters.create_mesh()
     return _mesh(done.points, done.regular_faces)
 
 
@@ -87,10 +92,8 @@ def isotropic(mesh: Mesh, faces: int) -> Mesh:
     area = float(np.linalg.norm(twice, axis=1).sum()) / 2
     length = EVEN * np.sqrt(4 / np.sqrt(3) * area / faces)
 
-    for _ in range(TRIES):
-        remeshed = _by_meshlab(mesh, _remeshed, length)
-        length *= np.sqrt(len(remeshed.faces) / faces)
-    return remeshed
+    first = _by_meshlab(mesh, _remeshed, length)
+    return _by_meshlab(mesh, _remeshed, length * np.sqrt(len(first.faces) / faces))
 
 
 SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
@@ -120,21 +123,21 @@ def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
     return part if near and kept else None
 
 
-def _decimated(meshes: pymeshlab.MeshSet, faces: float, **options: bool) -> None:
+def _decimated(meshes: Any, faces: float, **options: bool) -> None:
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=int(faces), preservenormal=True, preserveboundary=True, **options
     )
 
 
-def _remeshed(meshes: pymeshlab.MeshSet, length: float) -> None:
+def _remeshed(meshes: Any, length: float) -> None:
     meshes.meshing_isotropic_explicit_remeshing(
-        targetlen=pymeshlab.PureValue(length), iterations=ITERATIONS
+        targetlen=meshlab.PureValue(length), iterations=ITERATIONS, checksurfdist=False
     )
 
 
 def _by_meshlab(mesh: Mesh, run: Callable[..., None], size: float, **options: bool) -> Mesh:
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces.astype(np.int32)))
+    meshes = meshlab.MeshSet(verbose=False)
+    meshes.add_mesh(meshlab.Mesh(mesh.vertices, mesh.faces.astype(np.int32)))
     run(meshes, size, **options)
     done = meshes.current_mesh()
     return _mesh(done.vertex_matrix(), done.face_matrix())

@@ -11,10 +11,9 @@ from train.experiments.beyond import (
     fresh_ridges,
     lifted_stars,
     models,
-    real_meshes,
     shading,
     spheres,
-    whole_levels,
+    validation,
     whole_meshes,
 )
 from train.experiments.harness.experiment import Experiment
@@ -54,10 +53,8 @@ ORDERED: tuple[Experiment, ...] = (
     cad.EXPERIMENT,
     models.EXPERIMENT,
     families.EXPERIMENT,
-    real_meshes.TEST,
-    real_meshes.VALIDATION,
+    validation.EXPERIMENT,
     whole_meshes.EXPERIMENT,
-    whole_levels.EXPERIMENT,
     spheres.EXPERIMENT,
     fresh_ridges.EXPERIMENT,
     fairness.EXPERIMENT,

@@ -6,6 +6,7 @@ built by booleans, fillets and chamfers from prisms, cylinders and turned profil
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -35,6 +36,9 @@ from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Shape
 
+Solid: TypeAlias = TopoDS_Shape
+Vector = Sequence[float] | Float[np.ndarray, " N"]
+
 # Points nearer than this share of the shape's size are one vertex.
 WELD = 1e-7
 
@@ -57,40 +61,40 @@ class Tessellation:
     patch: Int[np.ndarray, " F"]
 
 
-def prism(outline: Float[np.ndarray, "N 2"], low: float, high: float) -> TopoDS_Shape:
+def prism(outline: Float[np.ndarray, "N 2"], low: float, high: float) -> Solid:
     """Return the prism of a polygon of the xy plane between two heights."""
     return BRepPrimAPI_MakePrism(
         _polygon(np.c_[outline, np.full(len(outline), low)]), gp_Vec(0, 0, high - low)
     ).Shape()
 
 
-def box(low: Sequence[float], high: Sequence[float]) -> TopoDS_Shape:
+def box(low: Vector, high: Vector) -> Solid:
     """Return the box between two corners."""
     (x, y, z), (u, v, w) = low, high
     return prism(np.array([[x, y], [u, y], [u, v], [x, v]]), z, w)
 
 
-def turned(profile: Float[np.ndarray, "N 2"]) -> TopoDS_Shape:
+def turned(profile: Float[np.ndarray, "N 2"]) -> Solid:
     """Return what a closed polygon of (radius, height) sweeps round the z axis."""
     points = np.c_[profile[:, 0], np.zeros(len(profile)), profile[:, 1]]
     axis = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
     return BRepPrimAPI_MakeRevol(_polygon(points), axis).Shape()
 
 
-def cylinder(centre: Sequence[float], radius: float, low: float, high: float) -> TopoDS_Shape:
+def cylinder(centre: Vector, radius: float, low: float, high: float) -> Solid:
     """Return an upright cylinder round (x, y)."""
     profile = np.array([[0, low], [radius, low], [radius, high], [0, high]])
     return moved(turned(profile), (*centre, 0.0))
 
 
-def moved(shape: TopoDS_Shape, shift: Sequence[float]) -> TopoDS_Shape:
+def moved(shape: Solid, shift: Vector) -> Solid:
     """Return a shape moved along a vector."""
     motion = gp_Trsf()
     motion.SetTranslation(gp_Vec(*map(float, shift)))
     return BRepBuilderAPI_Transform(shape, motion, True).Shape()
 
 
-def laid_over(shape: TopoDS_Shape, axis: int) -> TopoDS_Shape:
+def laid_over(shape: Solid, axis: int) -> Solid:
     """Return a shape whose upright axis points along x (0), y (1) or z (2)."""
     motion = gp_Trsf()
     direction = gp_Dir(*(float(k == axis) for k in range(3)))
@@ -99,19 +103,19 @@ def laid_over(shape: TopoDS_Shape, axis: int) -> TopoDS_Shape:
     return BRepBuilderAPI_Transform(shape, motion, True).Shape()
 
 
-def fused(shape: TopoDS_Shape, others: Iterable[TopoDS_Shape]) -> TopoDS_Shape:
+def fused(shape: Solid, others: Iterable[Solid]) -> Solid:
     """Return the union."""
     return _operated(BRepAlgoAPI_Fuse(), shape, others)
 
 
-def cut(shape: TopoDS_Shape, others: Iterable[TopoDS_Shape]) -> TopoDS_Shape:
+def cut(shape: Solid, others: Iterable[Solid]) -> Solid:
     """Return the shape without the others."""
     return _operated(BRepAlgoAPI_Cut(), shape, others)
 
 
 def _operated(
-    operation: BRepAlgoAPI_BooleanOperation, shape: TopoDS_Shape, others: Iterable[TopoDS_Shape]
-) -> TopoDS_Shape:
+    operation: BRepAlgoAPI_BooleanOperation, shape: Solid, others: Iterable[Solid]
+) -> Solid:
     arguments, tools = List_TopoDS_Shape(), List_TopoDS_Shape()
     arguments.Append(shape)
     for other in others:
@@ -125,7 +129,7 @@ def _operated(
     return operation.Shape()
 
 
-def edge_groups(shape: TopoDS_Shape) -> list[list[TopoDS_Edge]]:
+def edge_groups(shape: Solid) -> list[list[TopoDS_Edge]]:
     """Return the edges in groups of one kind of curve whose middles are at one height."""
     groups: dict[tuple[object, float], list[TopoDS_Edge]] = {}
     for part in _explored(shape, TopAbs_ShapeEnum.TopAbs_EDGE):
@@ -139,17 +143,17 @@ def edge_groups(shape: TopoDS_Shape) -> list[list[TopoDS_Edge]]:
     return list(groups.values())
 
 
-def filleted(shape: TopoDS_Shape, edges: Iterable[TopoDS_Edge], radius: float) -> TopoDS_Shape:
+def filleted(shape: Solid, edges: Iterable[TopoDS_Edge], radius: float) -> Solid:
     """Round edges with a radius; return the shape as it is where OpenCascade cannot."""
     return _finished(BRepFilletAPI_MakeFillet(shape), shape, edges, radius)
 
 
-def chamfered(shape: TopoDS_Shape, edges: Iterable[TopoDS_Edge], width: float) -> TopoDS_Shape:
+def chamfered(shape: Solid, edges: Iterable[TopoDS_Edge], width: float) -> Solid:
     """Chamfer edges by a width on both sides; return the shape as it is where it cannot be."""
     return _finished(BRepFilletAPI_MakeChamfer(shape), shape, edges, width)
 
 
-def tessellated(shape: TopoDS_Shape, deflection: float, angle: float) -> Tessellation:
+def tessellated(shape: Solid, deflection: float, angle: float) -> Tessellation:
     """Return triangles whose chords are within a deflection, and turn by at most an angle."""
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, angle, False)
@@ -191,7 +195,7 @@ def _welded(
     return Tessellation(points[first], welded[kept], normals[faces[kept]], patch[kept])
 
 
-def _explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+def _explored(shape: Solid, kind: TopAbs_ShapeEnum) -> Iterator[Solid]:
     """Yield all faces, or edges, each once."""
     found = IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()
     TopExp.MapShapes_s(shape, kind, found)
@@ -199,7 +203,7 @@ def _explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Sh
         yield found.FindKey(number)
 
 
-def _polygon(points: Float[np.ndarray, "N 3"]) -> TopoDS_Shape:
+def _polygon(points: Float[np.ndarray, "N 3"]) -> Solid:
     maker = BRepBuilderAPI_MakePolygon()
     for point in points:
         maker.Add(gp_Pnt(*map(float, point)))
@@ -209,10 +213,10 @@ def _polygon(points: Float[np.ndarray, "N 3"]) -> TopoDS_Shape:
 
 def _finished(
     maker: BRepFilletAPI_MakeFillet | BRepFilletAPI_MakeChamfer,
-    shape: TopoDS_Shape,
+    shape: Solid,
     edges: Iterable[TopoDS_Edge],
     size: float,
-) -> TopoDS_Shape:
+) -> Solid:
     edges = list(edges)
     shortest = min(GCPnts_AbscissaPoint.Length_s(BRepAdaptor_Curve(edge)) for edge in edges)
     try:

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 from matplotlib.textpath import TextPath
-from OCP.TopoDS import TopoDS_Shape
 
 from train.surfaces.brep import (
+    Solid,
     box,
     chamfered,
     cut,
@@ -26,7 +26,7 @@ from train.surfaces.brep import (
 )
 
 Outline = Float[np.ndarray, "N 2"]
-Solids = list[TopoDS_Shape]
+Solids = list[Solid]
 
 # Groups of edges that are rounded or chamfered, at most; by which share of the part's thickness.
 MOST_FINISHED, FINISHES, ROUNDED = 4, (0.05, 0.35), 0.55
@@ -34,7 +34,7 @@ MOST_FINISHED, FINISHES, ROUNDED = 4, (0.05, 0.35), 0.55
 LETTERS = "ABCDEFHJKLMNPRSTUVXYZ0123456789"
 
 
-def machined_part(rng: np.random.Generator) -> TopoDS_Shape:
+def machined_part(rng: np.random.Generator) -> Solid:
     """Return a random part, about one to four units across."""
     part, thickness = FAMILIES[int(rng.integers(len(FAMILIES)))](rng)
     for _ in range(int(rng.integers(0, MOST_FINISHED + 1))):
@@ -119,13 +119,13 @@ def _raised(
 
 
 def _with_features(
-    part: TopoDS_Shape,
+    part: Solid,
     half: Sequence[float],
     low: float,
     top: float,
     rng: np.random.Generator,
     most: int = 3,
-) -> TopoDS_Shape:
+) -> Solid:
     """Return a part with some features on its upper face, whose half sizes are given."""
     for _ in range(int(rng.integers(1, most + 1))):
         places = _places(half, rng)
@@ -138,7 +138,7 @@ def _with_features(
     return part
 
 
-def _plate(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _plate(rng: np.random.Generator) -> tuple[Solid, float]:
     x, y, top = *rng.uniform(0.5, 1.5, 2), rng.uniform(0.1, 0.5)
     u, v = x * rng.uniform(-0.3, 0.5), y * rng.uniform(-0.3, 0.5)
     kind = rng.integers(5)
@@ -156,7 +156,7 @@ def _plate(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return _with_features(part, half, 0, top, rng), top
 
 
-def _housing(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _housing(rng: np.random.Generator) -> tuple[Solid, float]:
     x, y, high = *rng.uniform(0.6, 1.5, 2), rng.uniform(0.3, 1.2)
     wall = rng.uniform(0.04, 0.14)
     part = box((-x, -y, 0), (x, y, high))
@@ -186,7 +186,7 @@ def _housing(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, wall
 
 
-def _shroud(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _shroud(rng: np.random.Generator) -> tuple[Solid, float]:
     half, top = rng.uniform(0.6, 1.2), rng.uniform(0.08, 0.4)
     hole, wall = half * rng.uniform(0.75, 0.93), rng.uniform(0.03, 0.1)
     part = box((-half, -half, 0), (half, half, top))
@@ -210,7 +210,7 @@ def _shroud(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return cut(part, _holes(screw, 0.07 * half, 0, top, rng)), min(wall, top)
 
 
-def _knob(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _knob(rng: np.random.Generator) -> tuple[Solid, float]:
     radius, high = rng.uniform(0.5, 1.0), rng.uniform(0.4, 1.4)
     upper, shoulder = radius * rng.uniform(0.6, 1.0), high * rng.uniform(0.2, 0.8)
     profile = [[0, 0], [radius, 0], [radius, shoulder], [upper, high], [0, high]]
@@ -237,7 +237,7 @@ def _knob(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, 0.3 * radius
 
 
-def _carriage(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _carriage(rng: np.random.Generator) -> tuple[Solid, float]:
     x, y, top = *rng.uniform(0.5, 1.2, 2), rng.uniform(0.4, 0.9)
     part = box((-x, -y, 0), (x, y, top))
     bore, apart = top * rng.uniform(0.2, 0.4), y * rng.uniform(0.4, 0.7)
@@ -260,7 +260,7 @@ def _carriage(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return _with_features(part, (x, y), 0, top, rng), 0.3 * top
 
 
-def _shaft(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _shaft(rng: np.random.Generator) -> tuple[Solid, float]:
     count = int(rng.integers(2, 6))
     radius = rng.uniform(0.15, 0.7, count)
     height = np.cumsum(rng.uniform(0.1, 0.8, count))
@@ -284,7 +284,7 @@ def _shaft(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, 0.3 * float(radius.min())
 
 
-def _screw(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _screw(rng: np.random.Generator) -> tuple[Solid, float]:
     """Return a screw or a nut; its thread is rings of triangles, not one helix."""
     core, turns = rng.uniform(0.2, 0.4), int(rng.integers(4, 14))
     pitch, head = core * rng.uniform(0.3, 0.7), core * rng.uniform(1.6, 2.2)
@@ -308,7 +308,7 @@ def _screw(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return fused(part, [cap]), 0.3 * tall
 
 
-def _gear(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _gear(rng: np.random.Generator) -> tuple[Solid, float]:
     teeth, radius, top = int(rng.integers(8, 32)), rng.uniform(0.7, 1.2), rng.uniform(0.15, 0.5)
     deep, step = radius * 3.5 / teeth, 2 * np.pi / teeth
     shape = np.array([[0.0, -1], [0.25, -1], [0.42, 0], [0.58, 0], [0.75, -1]])[1:]
@@ -338,7 +338,7 @@ def _gear(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, 0.2 * top
 
 
-def _bracket(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _bracket(rng: np.random.Generator) -> tuple[Solid, float]:
     x, y, high = rng.uniform(0.6, 1.4), rng.uniform(0.4, 1.0), rng.uniform(0.6, 1.5)
     wall = rng.uniform(0.08, 0.25)
     leg = box((-x, -y, 0), (wall - x, y, high))
@@ -358,10 +358,10 @@ def _bracket(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, wall
 
 
-def _sign(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _sign(rng: np.random.Generator) -> tuple[Solid, float]:
     text = "".join(rng.choice(list(LETTERS), int(rng.integers(1, 4))))
     top, deep = rng.uniform(0.15, 0.3), rng.uniform(0.04, 0.12)
-    outlines = [np.array(ring[:-1]) for ring in TextPath((0, 0), text, size=1).to_polygons()]
+    outlines = [np.asarray(ring)[:-1] for ring in TextPath((0, 0), text, size=1).to_polygons()]
     corners = np.concatenate(outlines)
     low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
     plate = box((*low, 0), (*high, top))
@@ -381,7 +381,7 @@ def _area(ring: Outline) -> float:
     return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()) / 2
 
 
-def _blocks(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
+def _blocks(rng: np.random.Generator) -> tuple[Solid, float]:
     """Return boxes and cylinders along all axes, joined and cut."""
     part = box((-0.8, -0.6, -0.5), rng.uniform(0.3, 1.0, 3))
     for _ in range(int(rng.integers(2, 6))):
@@ -397,7 +397,7 @@ def _blocks(rng: np.random.Generator) -> tuple[TopoDS_Shape, float]:
     return part, 0.2
 
 
-FAMILIES: tuple[Callable[[np.random.Generator], tuple[TopoDS_Shape, float]], ...] = (
+FAMILIES: tuple[Callable[[np.random.Generator], tuple[Solid, float]], ...] = (
     _plate,
     _housing,
     _shroud,

@@ -16,10 +16,16 @@ READERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
 }
+# Blender's own meshes, by these words in place of a path.
+MADE = {
+    "suzanne": lambda path: bpy.ops.mesh.primitive_monkey_add(rotation=(0, 0, 0)),
+    "cube": lambda path: bpy.ops.mesh.primitive_cube_add(),
+    "cylinder": lambda path: bpy.ops.mesh.primitive_cylinder_add(vertices=16),
+}
 
 
 def read(path: Path) -> Mesh:
-    """Read the triangles of a file, z up; vertices at the same place are one.
+    """Read the triangles of a file, or of a mesh of Blender's own; vertices in one place are one.
 
     Raises:
         SystemExit: Blender has no reader for it, or there is nothing in it.
@@ -27,7 +33,7 @@ def read(path: Path) -> Mesh:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             return welded(arrays["vertices"], arrays["faces"])
-    reader = READERS.get(path.suffix.lower())
+    reader = MADE.get(str(path)) or READERS.get(path.suffix.lower())
     if reader is None:
         raise SystemExit(f"{path}: not one of {', '.join([*READERS, '.npz'])}")
     before = set(bpy.data.objects)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import radians
 
+import bmesh
+import bpy
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -15,6 +18,8 @@ from pns_common.topology import build_topology
 
 # N1 asks no network: pushes of strength 1 alone.
 N1 = Rule(lambda features: np.zeros((len(features), 3)), 18, True, 1.0, 1.0, prior_strength=1.0)
+# Triangles of one polygon turn by less; and quads that are joined of two bend and lean by less.
+FLAT, LEAN = radians(0.1), radians(40)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +41,28 @@ def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
 def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     """Refine by Loop's rules."""
     return _smooth("Loop", refine(mesh, loop(), levels), {})
+
+
+def subsurf_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
+    """Put Blender's Subdivision Surface on the polygons that the triangles were cut from."""
+    data = bpy.data.meshes.new("subsurf")
+    data.from_pydata(mesh.vertices, [], mesh.faces.tolist())
+    edited = bmesh.new()
+    edited.from_mesh(data)
+    bmesh.ops.dissolve_limit(edited, angle_limit=FLAT, verts=[], edges=edited.edges)
+    bmesh.ops.join_triangles(
+        edited, faces=edited.faces, angle_face_threshold=LEAN, angle_shape_threshold=LEAN
+    )
+    edited.to_mesh(data)
+    edited.free()
+    obj = bpy.data.objects.new("subsurf", data)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.modifiers.new("subsurf", "SUBSURF").levels = levels
+    shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points, polygons = (np.array([[*v.co] for v in shown.vertices]), shown.polygons)
+    faces = Mesh(points, [[*polygon.vertices] for polygon in polygons]).triangulated().faces
+    bpy.data.meshes.remove(data)
+    return Shape("Subdivision Surface", points, faces, True, {})
 
 
 def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
@@ -72,6 +99,7 @@ def spread(
 VARIANTS: dict[str, Callable[[Mesh, int, str | None], Shape]] = {
     "control": control,
     "loop": loop_surface,
+    "subsurf": subsurf_surface,
     "n1": pushed_surface,
     "pns": learned_surface,
 }

@@ -15,20 +15,18 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, PointerProperty, StringProperty
-
-from pns_common import PnsError
+from bpy.props import BoolProperty, IntProperty, PointerProperty, StringProperty
 
 from .live_nodes import modifier_of, point_at, remove_modifier
 from .overlay import hide, rescale
-from .reading import read_mesh
-from .run import Made, Share, refine_mesh
+from .reading import Reading, read_mesh
+from .run import Made, Run, Share, refine_mesh
 from .settings import Settings, choice_of
-from .writing import CACHE, LIVE, copied, take_name
+from .writing import CACHE, CARRIER, LIVE, copied, take_name
 
 
 class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's names)
@@ -38,15 +36,18 @@ class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's n
     automatic: BoolProperty(
         name="Automatic", description="Refresh after each edit of the mesh", default=True
     )
+    render_levels: IntProperty(
+        name="Render Levels",
+        description="How often each triangle is cut into four when a picture is rendered",
+        default=2,
+        min=1,
+        max=6,
+    )
     cache: PointerProperty(type=bpy.types.Object)
     spare: PointerProperty(type=bpy.types.Object)
     first: PointerProperty(type=bpy.types.Mesh)
     second: PointerProperty(type=bpy.types.Mesh)
     problem: StringProperty()
-
-
-class LiveError(PnsError):
-    """The mesh has what live mode cannot show."""
 
 
 def users_of(mesh: bpy.types.Mesh) -> list[bpy.types.Object]:
@@ -66,7 +67,6 @@ def refreshed(obj: bpy.types.Object, share: Share) -> Generator[object, None, bo
         PnsError: the mesh cannot be refined.
     """
     mesh: bpy.types.Mesh = obj.data
-    _refuse_shape_keys(mesh)
     if mesh.is_editmode:
         _read_edits(obj)
     with _as_it_is(obj) as still:
@@ -79,22 +79,65 @@ def _refreshed(
     live = mesh.pns_live
     # Its object may have the modifier of another.
     live.enabled = True
-    digest = yield from _digest(still.data, live)
+    reading: Reading = yield from read_mesh(still.data)
+    digest = _digest(still.data, reading, live)
     whole = all(getattr(live, name) is not None for name in CACHE)
     if not whole or (_borrowed(mesh) and shown_of(live).pns_result.digest != digest):
         _make_cache(mesh)
     _keep_out_of_scenes(live)
     changed = shown_of(live).pns_result.digest != digest
     if changed:
-        before = shown_of(live)
-        spare = live.second if before == live.first else live.first
-        made: Made = yield from refine_mesh(still, choice_of(live), share, into=spare)
+        before, spare = shown_of(live), _spare_of(live)
+        made: Made = yield from refine_mesh(still, choice_of(live), share, 0, 1, spare, reading)
+        follow(made.mesh.shape_keys, mesh.shape_keys)
         made.mesh.pns_result.digest = digest
         live.cache.data, live.spare.data = made.mesh, before
         empty(before)
     live.problem = ""
     point(mesh)
     return changed
+
+
+def show_for_render(mesh: bpy.types.Mesh) -> None:
+    """Show a mesh refined as often as renders ask for, until ``show_again``.
+
+    Raises:
+        PnsError: the mesh cannot be refined.
+    """
+    live = mesh.pns_live
+    obj = next(iter(users_of(mesh)), None)
+    if obj is None or live.cache is None or live.render_levels == live.levels:
+        return
+    choice = replace(choice_of(live), levels=live.render_levels)
+    with _as_it_is(obj) as still:
+        made: Made = Run(refine_mesh(still, choice, Share(), into=_spare_of(live))).finish()
+    follow(made.mesh.shape_keys, mesh.shape_keys)
+    live.cache.data, live.spare.data = made.mesh, live.cache.data
+
+
+def show_again(mesh: bpy.types.Mesh) -> None:
+    """Show what the viewport shows: of both results the one that says what it was made from."""
+    live = mesh.pns_live
+    if live.cache is not None and not shown_of(live).pns_result.digest:
+        live.cache.data, live.spare.data = live.spare.data, live.cache.data
+        empty(live.spare.data)
+
+
+def follow(result: bpy.types.Key | None, base: bpy.types.Key | None) -> None:
+    """Let a result's shape keys have the values of its base's, at any time."""
+    if result is None or base is None:
+        return
+    paths = [
+        (block, "value", f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value')
+        for block in result.key_blocks
+    ]
+    for owner, name, path in [*paths, (result, "eval_time", "eval_time")]:
+        driver = owner.driver_add(name).driver
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        variable.targets[0].id_type = "KEY"
+        variable.targets[0].id = base
+        variable.targets[0].data_path = path
 
 
 def apply(obj: bpy.types.Object) -> Generator[object, None, None]:
@@ -104,7 +147,6 @@ def apply(obj: bpy.types.Object) -> Generator[object, None, None]:
         PnsError: the mesh cannot be refined.
     """
     mesh: bpy.types.Mesh = obj.data
-    _refuse_shape_keys(mesh)
     made: Made = yield from refine_mesh(obj, choice_of(mesh.pns_live), Share())
     remove(obj)
     obj.data = made.mesh
@@ -116,8 +158,16 @@ def shown_of(live: PNS_PG_live) -> bpy.types.Mesh:
     return live.cache.data
 
 
+def _spare_of(live: PNS_PG_live) -> bpy.types.Mesh:
+    return live.second if shown_of(live) == live.first else live.first
+
+
 def empty(result: bpy.types.Mesh) -> None:
     """Drop what a refined mesh holds, and what it says of it."""
+    if result.shape_keys is not None:
+        holder = bpy.data.objects.new(CARRIER, result)
+        holder.shape_key_clear()
+        bpy.data.objects.remove(holder)
     result.clear_geometry()
     result.pns_result.digest = ""
 
@@ -205,13 +255,6 @@ def _keep_out_of_scenes(live: PNS_PG_live) -> None:
             collection.objects.unlink(hidden)
 
 
-def _refuse_shape_keys(mesh: bpy.types.Mesh) -> None:
-    if mesh.shape_keys is not None:
-        raise LiveError(
-            "Live mode shows one mesh, and shape keys need one each: remove them, or live mode"
-        )
-
-
 def _borrowed(mesh: bpy.types.Mesh) -> bool:
     """Return whether another mesh has the same result, as after duplication."""
     cache = mesh.pns_live.cache
@@ -220,9 +263,8 @@ def _borrowed(mesh: bpy.types.Mesh) -> bool:
     )
 
 
-def _digest(mesh: bpy.types.Mesh, live: PNS_PG_live) -> Generator[None, None, str]:
+def _digest(mesh: bpy.types.Mesh, reading: Reading, live: PNS_PG_live) -> str:
     """Return a text that changes when the mesh changes, or what is asked for."""
-    reading = yield from read_mesh(mesh)
     digest = hashlib.blake2b(digest_size=16)
     snapshot = reading.snapshot
     for layer in snapshot.layers:
@@ -234,10 +276,11 @@ def _digest(mesh: bpy.types.Mesh, live: PNS_PG_live) -> Generator[None, None, st
         snapshot.edges,
         snapshot.crease_sharpness,
         snapshot.groups,
+        snapshot.offsets,
     ):
         digest.update(np.ascontiguousarray(array))
     materials = [None if material is None else material.name for material in mesh.materials]
     groups = [astuple(group) for group in reading.groups]
     asked = [getattr(live, name) for name in Settings.__annotations__]
-    digest.update(repr((materials, groups, asked)).encode())
+    digest.update(repr((materials, groups, asked, reading.key_names)).encode())
     return digest.hexdigest()

@@ -40,7 +40,7 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh of this file is active, not live yet, and without shape keys."""
+        """Return whether a mesh of this file is active, and not live yet."""
         obj = context.object
         if obj is None or obj.type != "MESH":
             cls.poll_message_set("Select a mesh first")
@@ -50,11 +50,6 @@ class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names
             return False
         if not (obj.is_editable and obj.data.is_editable):
             cls.poll_message_set(LINKED)
-            return False
-        if obj.data.shape_keys is not None:
-            cls.poll_message_set(
-                "Live mode shows one mesh, and shape keys need one each: refine a copy instead"
-            )
             return False
         return True
 

@@ -18,6 +18,8 @@ from .live import (
     paint,
     point,
     refreshed,
+    show_again,
+    show_for_render,
     shown_of,
     take_away_cache,
     users_of,
@@ -149,6 +151,8 @@ def before_undo(*_: object) -> None:
         for result in (mesh.pns_live.first, mesh.pns_live.second):
             if result is not None:
                 paint(result, ())
+                if result.shape_keys is not None:
+                    empty(result)
     WATCH.young.clear()
 
 
@@ -164,6 +168,24 @@ def after_undo(*_: object) -> None:
             point(mesh)
         if live.automatic:
             WATCH.note(mesh)
+
+
+@persistent
+def before_render(*_: object) -> None:
+    """Show every mesh as often refined as renders ask for."""
+    WATCH.pause()
+    for mesh in live_meshes():
+        try:
+            show_for_render(mesh)
+        except PnsError as error:
+            mesh.pns_live.problem = str(error)
+
+
+@persistent
+def after_render(*_: object) -> None:
+    """Show every mesh as the viewport has it."""
+    for mesh in live_meshes():
+        show_again(mesh)
 
 
 def _is_followed(mesh: bpy.types.Mesh) -> bool:

@@ -113,9 +113,6 @@ def _of_modifiers(obj: bpy.types.Object) -> list[str]:
         said.append(f"Hooks move the old vertices alone: {listed(hooks)}")
     if obj.particle_systems:
         said.append("Particles and hair are to be placed again")
-    subdividing = subdividing_modifiers(obj)
-    if subdividing:
-        said.append(f"The refined mesh is subdivided again by: {listed(subdividing)}")
     simulated = [m.name for m in obj.modifiers if m.type in SIMULATED]
     if simulated:
         said.append(f"To be baked again: {listed(simulated)}")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty
+from mathutils import Vector
 
 from pns_common import PnsError
 from pns_common.kernels import are_compiled
@@ -58,6 +60,12 @@ class Refining(Settings):
         default=True,
     )
 
+    beside: BoolProperty(
+        name="Beside",
+        description="Put new objects beside the old ones, but for those that other objects move",
+        default=True,
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether it is object mode, with some mesh that has faces."""
@@ -75,6 +83,9 @@ class Refining(Settings):
         layout.use_property_split = True
         self.draw_settings(layout)
         layout.prop(self, "keep_original")
+        column = layout.column()
+        column.enabled = self.keep_original
+        column.prop(self, "beside")
         draw_forecast(layout, chosen_objects(context), self.levels)
 
     def refused(self, context: bpy.types.Context) -> bool:
@@ -103,6 +114,8 @@ class Refining(Settings):
         found = [bpy.data.objects.get(key) for key in self.objects]
         objects = [obj for obj in found if obj is not None]
         placed = [place(obj, made[key_of(obj.data)], self.keep_original) for obj in objects]
+        if self.keep_original and self.beside:
+            put_beside(placed, objects)
         if not self.keep_original:
             for refined in made.values():
                 take_name(refined.mesh, refined.source)
@@ -208,6 +221,26 @@ class OBJECT_OT_pns_refine_large(Refining, bpy.types.Operator):  # noqa: N801 (B
         context.workspace.status_text_set(None)
 
 
+class OBJECT_OT_pns_subsurf_off(bpy.types.Operator):  # noqa: N801 (Blender's names)
+    """Switch off the Subdivision Surface modifiers of the selected objects"""
+
+    bl_idname = "object.pns_subsurf_off"
+    bl_label = "Switch Off Subdivision Surface"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there is such a modifier that acts."""
+        return any(map(subdividing_modifiers, chosen_objects(context)))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Hide them in the viewport and in renders."""
+        for obj in filter(lambda obj: obj.is_editable, chosen_objects(context)):
+            for name in subdividing_modifiers(obj):
+                obj.modifiers[name].show_viewport = obj.modifiers[name].show_render = False
+        return {"FINISHED"}
+
+
 def place(obj: bpy.types.Object, made: Made, keep_original: bool) -> bpy.types.Object:
     """Give a refined mesh to a copy of an object, or to itself; the object that has it.
 
@@ -228,6 +261,22 @@ def place(obj: bpy.types.Object, made: Made, keep_original: bool) -> bpy.types.O
     return new
 
 
+def put_beside(new: list[bpy.types.Object], old: list[bpy.types.Object]) -> None:
+    """Move new objects along x by a tenth more than the old ones are wide together.
+
+    Those stay that others move: by a parent, a constraint or a modifier.
+    """
+    across = [(obj.matrix_world @ Vector(corner)).x for obj in old for corner in obj.bound_box]
+    for obj in new:
+        if not (obj.parent or obj.constraints or any(map(_by_another, obj.modifiers))):
+            obj.location.x += 1.1 * float(np.ptp(across))
+
+
+def _by_another(modifier: bpy.types.Modifier) -> bool:
+    """Return whether a modifier reads another object, as an Armature or a Hook does."""
+    return getattr(modifier, "object", None) is not None
+
+
 def homes_of(obj: bpy.types.Object) -> list[bpy.types.Collection]:
     """Return the collections that an object is in and a copy may be too; at least the scene's."""
     own = [c for c in obj.users_collection if c.is_editable and c.override_library is None]
@@ -241,6 +290,12 @@ def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], l
     warning = too_many(count, levels)
     if warning:
         layout.label(text=warning, icon="ERROR")
+    draw_subdivided(layout, objects)
+
+
+def draw_subdivided(layout: bpy.types.UILayout, objects: list[bpy.types.Object]) -> None:
+    """Show which modifiers subdivide the result again, and a button that switches them off."""
     again = sorted({name for o in objects for name in subdividing_modifiers(o)})
     if again:
-        layout.label(text=f"Turn off, or it subdivides again: {listed(again)}", icon="ERROR")
+        layout.label(text=f"It is subdivided again by: {listed(again)}", icon="ERROR")
+        layout.operator(OBJECT_OT_pns_subsurf_off.bl_idname)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import live
-from .operator import OBJECT_OT_pns_refine, chosen_objects, draw_forecast
+from .operator import OBJECT_OT_pns_refine, chosen_objects, draw_forecast, draw_subdivided
 from .overlay import TITLES, current, ramp_of, shown_mesh
 from .result import certificate_lines, in_units, largest_scale, note_lines
 
@@ -48,6 +48,7 @@ class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's na
         column = self.layout.column(align=True)
         for line in certificate_lines(context.object, mesh, context.scene):
             column.label(text=line)
+        draw_subdivided(self.layout, [context.object])
         notes = note_lines(mesh)
         if notes:
             box = self.layout.box().column(align=True)
@@ -106,12 +107,11 @@ class VIEW3D_PT_pns_live(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's name
         obj, layout = context.object, self.layout
         if live.modifier_of(obj) is None:
             layout.operator("object.pns_live_add")
-            if obj.data.shape_keys is not None:
-                layout.label(text="Shape keys need one mesh each: refine a copy", icon="ERROR")
             return
         settings = obj.data.pns_live
         layout.use_property_split = True
         settings.draw_settings(layout)
+        layout.prop(settings, "render_levels")
         layout.prop(settings, "automatic")
         draw_forecast(layout, [obj], settings.levels)
         if settings.problem:

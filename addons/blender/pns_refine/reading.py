@@ -42,12 +42,13 @@ class Reading:
 
 def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
     """Read a mesh; yields between pieces, and returns the reading."""
-    mesh.calc_loop_triangles()
-    triangles = _ints(mesh.loop_triangles, "vertices", 3)
-    corners = _ints(mesh.loop_triangles, "loops", 3)
-    polygons = _ints(mesh.loop_triangles, "polygon_index", 1)[:, 0]
-    starts = _ints(mesh.polygons, "loop_start", 1)[:, 0]
-    edges = _ints(mesh.edges, "vertices", 2)
+    starts = np.append(_ints(mesh.polygons, "loop_start", 1)[:, 0], len(mesh.loops))
+    sizes = np.diff(starts)
+    # Attributes are copied as a block; other properties are read one by one.
+    corners = np.arange(len(mesh.loops)).reshape(-1, 3) if (sizes == 3).all() else _cut(mesh)
+    triangles = _ints(mesh.attributes[".corner_vert"].data, "value", 1)[:, 0][corners]
+    polygons = np.repeat(np.arange(len(sizes)), sizes - 2)
+    edges = _ints(mesh.attributes[".edge_verts"].data, "value", 2)
     yield
     layers: list[Layer] = []
     for layer in read_layers(mesh):
@@ -71,15 +72,20 @@ def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
         triangles=triangles,
         corners=corners,
         polygons=polygons,
-        polygon_corners=np.append(starts, len(mesh.loops)),
+        polygon_corners=starts,
         edges=edges,
         crease_sharpness=crease_sharpness_of(_creases(mesh)),
         groups=groups,
         offsets=offsets,
         layers=tuple(layers),
     )
-    sizes = np.diff(snapshot.polygon_corners)
     return Reading(snapshot, _groups(mesh), keys, empty, int(sizes.max(initial=0)))
+
+
+def _cut(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the corners (T, 3) of the triangles that polygons are cut into, in their order."""
+    mesh.calc_loop_triangles()
+    return _ints(mesh.loop_triangles, "loops", 3)
 
 
 def _groups(mesh: bpy.types.Mesh) -> tuple[Group, ...]:

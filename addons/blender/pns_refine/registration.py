@@ -12,6 +12,7 @@ CLASSES = (
     live.PNS_PG_live,
     operator.OBJECT_OT_pns_refine,
     operator.OBJECT_OT_pns_refine_large,
+    operator.OBJECT_OT_pns_subsurf_off,
     overlay.OBJECT_OT_pns_overlay,
     live_operators.OBJECT_OT_pns_live_add,
     live_operators.OBJECT_OT_pns_live_refresh,
@@ -32,6 +33,9 @@ HANDLERS = (
     ("redo_post", live_watch.after_undo),
     ("save_pre", live_watch.before_save),
     ("load_pre", live_watch.before_load),
+    ("render_init", live_watch.before_render),
+    ("render_complete", live_watch.after_render),
+    ("render_cancel", live_watch.after_render),
 )
 
 

@@ -119,15 +119,17 @@ def refine_mesh(
     number: int = 0,
     count: int = 1,
     into: bpy.types.Mesh | None = None,
+    reading: Reading | None = None,
 ) -> Generator[object, None, Made]:
     """Refine a copy of an object's mesh; the computation runs in a thread of its own.
 
-    ``into`` is written anew, if given, in place of a new mesh.
+    ``into`` is written anew, if given, in place of a new mesh; ``reading`` is the mesh's, if known.
     """
     if not are_compiled():
         yield from compile_kernels(share)
     mesh: bpy.types.Mesh = obj.data
-    reading: Reading = yield from read_mesh(mesh)
+    if reading is None:
+        reading = yield from read_mesh(mesh)
     job = Job(partial(compute, reading.snapshot, choice)).start()
     try:
         while job.running:

@@ -14,6 +14,7 @@ from pns_common.model.file import DEFAULT_MODEL, bundled_models
 from pns_common.model.session import OnnxModel
 
 from .refining.compute import Choice
+from .refining.snapshot import Smoothing
 
 NO_ANGLE = math.pi
 # Since 5.0 a path says whether it may begin at the folder of the file, "//".
@@ -112,6 +113,18 @@ class Settings:
         default=False,
     )
 
+    uv_smooth: EnumProperty(
+        name="UV Smooth",
+        description="Which points of UV maps stay in their places",
+        items=(
+            ("NONE", "None", "All stay, and edges stay straight"),
+            ("PRESERVE_CORNERS", "Keep Corners", "Corners of a patch that one face has alone"),
+            ("PRESERVE_BOUNDARIES", "Keep Boundaries", "The borders of patches"),
+            ("SMOOTH_ALL", "All", "None stays: borders are smoothed too"),
+        ),
+        default="PRESERVE_BOUNDARIES",
+    )
+
     def draw_settings(self, layout: bpy.types.UILayout) -> None:
         """Show the properties."""
         layout.prop(self, "levels")
@@ -127,6 +140,7 @@ class Settings:
         column.prop(self, "crease_lines")
         layout.prop(self, "crease_angle")
         layout.prop(self, "quads")
+        layout.prop(self, "uv_smooth")
 
 
 def choice_of(settings: Settings) -> Choice:
@@ -145,4 +159,5 @@ def choice_of(settings: Settings) -> Choice:
         crease_angle=None if angle >= NO_ANGLE else angle,
         crease_lines=settings.crease_lines,
         quads=settings.quads,
+        uv_smooth=Smoothing(settings.uv_smooth),
     )

@@ -51,6 +51,8 @@ def write_mesh(
         lost = yield from _write_layers(mesh, refined)
         yield from _write_groups(carrier, refined, reading)
         yield from _write_keys(carrier, refined, reading, source)
+        if into is None and source.shape_keys is not None:
+            copy_animation(source.shape_keys, mesh.shape_keys)
         yield from _write_normals(mesh, refined)
         _choose_as(mesh, source)
         mesh.update()
@@ -166,7 +168,6 @@ def _write_keys(
         new[name] = value
     new.use_relative = old.use_relative
     new.eval_time = old.eval_time
-    copy_animation(old, new)
 
 
 def _write_normals(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:

@@ -31,6 +31,7 @@ class TrianglePrimitive:
         accessors: descriptions of these by name; without bytes for dequantised ones.
         targets: for each morph target, arrays by name that are added to the attributes.
         target_accessors: for each morph target, descriptions by name.
+        positions: the number of the accessor of positions, whose elements `rows` are.
     """
 
     number: int
@@ -40,6 +41,7 @@ class TrianglePrimitive:
     accessors: dict[str, Accessor]
     targets: tuple[dict[str, Shaped[np.ndarray, "N K"]], ...] = ()
     target_accessors: tuple[dict[str, Accessor], ...] = ()
+    positions: int = 0
 
     @property
     def is_double(self) -> bool:
@@ -88,6 +90,7 @@ def read_primitive(
         accessors=accessors,
         targets=tuple(values for values, _ in targets),
         target_accessors=tuple(described for _, described in targets),
+        positions=primitive.attributes["POSITION"],
     )
 
 

@@ -7,25 +7,29 @@ normals are those of the surface that it makes, and its tangents are perpendicul
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.grid import rounded_rows
-from pns_common.normals import perpendicular_tangents
+from pns_common.normals import count_opposed, perpendicular_tangents
 from pns_common.parallel import Blocks, available_threads
+from pns_common.rows import marked
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
+from ...report import Change
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
 from .columns import SkinAndMorph, skin_attributes
 from .control_mesh import ControlMesh, refined_ids, slices
 from .mesh_refine import RefinedMesh
 from .normals import Shading, safe_unit, shade
+from .selection import Cut, cut_triangles, keep_still, with_still
 
 # Share of the progress that normals take.
 SHADING = 0.85
@@ -41,6 +45,7 @@ class RefinedPrimitive:
     """A refined primitive, in the types in which it is written.
 
     `vertex` is the vertex of the refined mesh at each row; None where it was cut from a union.
+    `counts` is how many of the faces each face before became; None: as many of each.
     """
 
     source: TrianglePrimitive
@@ -48,6 +53,7 @@ class RefinedPrimitive:
     attributes: Columns
     targets: list[Columns]
     vertex: Int[np.ndarray, " N"] | None = None
+    counts: Int[np.ndarray, " P"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +86,13 @@ def refined_primitives(
     grid: BarycentricGrid,
     uv_blend: UvBlend,
     course: Course,
+    cut: Cut | None = None,
 ) -> list[RefinedPrimitive]:
     """Return the refined primitives; primitives without faces are left out."""
     ids = refined_ids(control.weld, control.cleaned, refined.mesh, grid)
     ends = slices(control.kept_counts)
+    if cut is not None:
+        refined = with_still(refined, control, cut, ids, grid)
     with course.part(0.0, SHADING):
         shading = shade(
             control,
@@ -100,8 +109,9 @@ def refined_primitives(
             course.reach(rows.start / len(ids))
             if rows.stop > rows.start:
                 own = ids[rows]
+                part = None if cut is None else Cut(cut.kind[rows], cut.still)
                 made.append(
-                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend)
+                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend, part)
                 )
     return made
 
@@ -114,6 +124,7 @@ def _refined_primitive(
     refined: RefinedMesh,
     shading: Shading | None,
     uv_blend: UvBlend,
+    cut: Cut | None,
 ) -> RefinedPrimitive:
     primitive = control.primitives[number]
     welded = control.weld.vertex_of[control.rows[number]]
@@ -151,7 +162,20 @@ def _refined_primitive(
     ]
     for name, values in refined.scalars.items():
         attributes[name] = values[vertex, None].astype(np.float32)
-    return RefinedPrimitive(primitive, own.refined_faces, attributes, targets, vertex)
+    if cut is None:
+        return RefinedPrimitive(primitive, own.refined_faces, attributes, targets, vertex)
+    still = cut.still[vertices.vertex]
+    before = primitive.attributes, *primitive.targets
+    for columns, old in zip((attributes, *targets), before, strict=True):
+        keep_still(columns, old, row, still)
+    faces, counts = cut_triangles(cut.kind, own.ids, grid)
+    used = np.flatnonzero(marked(faces.reshape(-1), own.count))
+    attributes, *targets = (
+        {name: values[used] for name, values in columns.items()}
+        for columns in (attributes, *targets)
+    )
+    faces = np.searchsorted(used, faces)
+    return RefinedPrimitive(primitive, faces, attributes, targets, vertex[used], counts)
 
 
 def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvBlend) -> Columns:
@@ -177,6 +201,24 @@ def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvB
         else:
             refined[name] = _blend(name, own, corners, primitive.accessors[name])
     return refined
+
+
+def opposed_normals(refined: Sequence[RefinedPrimitive], pointer: str) -> list[Change]:
+    """Return how many normals of each primitive of the mesh at `pointer` oppose their face."""
+    blocks = Blocks(available_threads())
+    counts = {
+        part.source.number: count_opposed(
+            part.attributes["POSITION"], part.attributes["NORMAL"], part.faces, blocks
+        )
+        for part in refined
+        if "NORMAL" in part.attributes
+    }
+    what = "corners with a normal that points away from their face's front"
+    return [
+        Change(f"{pointer}/primitives/{number}", what, count)
+        for number, count in counts.items()
+        if count
+    ]
 
 
 def _target(

@@ -16,8 +16,9 @@ from pns_common.rows import distinct_rows, dot, norm, unit
 
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import blocks_of
-from ...meshes.weld import Weld, weld
+from ...meshes.weld import Weld, weld, weld_by_label
 from ...meshes.weld_tolerance import WHOLE, weld_within
+from ...options import Options
 from ..read.primitives import TrianglePrimitive
 from .columns import SkinAndMorph, read_skin_and_morph
 
@@ -154,12 +155,9 @@ class ControlMesh:
 
 
 def control_mesh(
-    primitives: Sequence[TrianglePrimitive],
-    tolerance: float,
-    unit_of_length: float | None,
-    parts: Parts | None = None,
+    primitives: Sequence[TrianglePrimitive], options: Options, parts: Parts | None = None
 ) -> ControlMesh:
-    """Weld and clean the triangle primitives of a mesh; tolerance and unit as in `weld_within`.
+    """Weld and clean the triangle primitives of a mesh, as the options ask for.
 
     The `parts` of a union are never joined, and follow each other in the mesh to refine.
     """
@@ -172,8 +170,12 @@ def control_mesh(
     if parts is not None:
         movement, order = parts.apart(movement), parts.order
         faces, starts = faces[order], np.searchsorted(parts.of_face[order], np.arange(parts.count))
-    exact = weld(positions, faces, movement)
-    welded = weld_within(exact, tolerance, unit_of_length, movement, starts)
+    if options.weld == "position":
+        exact = weld(positions, faces, movement)
+        tolerance, unit_of_length = options.weld_tolerance, options.weld_unit
+        welded = weld_within(exact, tolerance, unit_of_length, movement, starts)
+    else:
+        exact = welded = weld_by_label(positions, faces, _labels(primitives, options, movement))
     proper = ~repeated_vertex(welded.faces)
     cleaned = clean(Mesh(welded.points, welded.faces)) if proper.any() else None
     near = _vertex_counts(exact.faces, starts) - _vertex_counts(welded.faces, starts)
@@ -196,6 +198,19 @@ def control_mesh(
         skin_and_morph=skin_and_morph,
         near=near,
     )
+
+
+def _labels(
+    primitives: Sequence[TrianglePrimitive],
+    options: Options,
+    movement: Int[np.ndarray, " N"] | None,
+) -> Int[np.ndarray, " N"]:
+    """Label the rows of primitives that are one vertex of the file, or none with another."""
+    if options.weld == "off":
+        return np.arange(sum(len(p.attributes["POSITION"]) for p in primitives))
+    named = [np.stack([np.full(len(p.rows), p.positions), p.rows], axis=1) for p in primitives]
+    columns = [np.concatenate(named)] + ([] if movement is None else [movement[:, None]])
+    return distinct_rows(np.hstack(columns))
 
 
 def joined_normals(

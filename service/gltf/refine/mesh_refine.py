@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from pns_common.columns import level_topologies
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine, refine_many
@@ -44,6 +45,7 @@ class RefinedMesh:
         cut: (P,) vertices of each part that lost a joint for lack of slots.
         scalars: further attributes by name.
         limit_normals: normals to use in place of those of the faces; None: none.
+        parents: the vertices of the control mesh that each is made of; None: not asked for.
     """
 
     mesh: Mesh
@@ -52,6 +54,7 @@ class RefinedMesh:
     cut: Int[np.ndarray, " P"]
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
+    parents: SubdivisionMatrix | None = None
 
 
 def creases_of(
@@ -65,11 +68,12 @@ def creases_of(
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
-        return Creases(hard_edges(control))
+        return Creases(hard_edges(control), border=options.border)
     if parts is None or options.crease != "auto" or not scheme.creases.learned:
         by_shape = creases_by_shape(control.mesh, options, scheme)
     else:
         by_shape = _creases_of_parts(control, parts, scheme)
+    by_shape = replace(by_shape, border=options.border)
     if options.crease != "auto" or not scheme.creases.finds:
         return by_shape
     return by_shape.with_named(marked_edges(control))
@@ -102,8 +106,10 @@ def refined_mesh(
     options: Options,
     pointer: str,
     course: Course,
+    *,
+    traced: bool = False,
 ) -> RefinedMesh:
-    """Refine a control mesh that has faces.
+    """Refine a control mesh that has faces; `traced` asks for the parents of vertices.
 
     Raises:
         UnrefinableError: refined positions leave the range of float32.
@@ -129,6 +135,7 @@ def refined_mesh(
         *refined_skin_and_morph(control, faces, levels, options, course),
         _scalars(made, options),
         made.normals if options.normals == "limit" else None,
+        made.parents if traced else None,
     )
 
 

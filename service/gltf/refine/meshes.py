@@ -10,6 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool
 
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.progress import LEARNED_COST
 from pns_common.report import Report
 from pns_common.schemes import Scheme
@@ -23,8 +24,8 @@ from ...report import Change
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
-from .attributes import RefinedPrimitive, refined_primitives
-from .control_mesh import control_mesh
+from .attributes import RefinedPrimitive, opposed_normals, refined_primitives
+from .control_mesh import ControlMesh, control_mesh
 from .mesh_refine import (
     changes_of_primitive,
     changes_of_vertices,
@@ -34,6 +35,7 @@ from .mesh_refine import (
 )
 from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
+from .selection import Chosen, chosen_primitives, cut_faces
 from .together import StageShares, kind_of, refine_together
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
@@ -60,6 +62,7 @@ class MeshOutcome:
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
         bends: bent edges, and the sharp ones among them.
+        parents: rows of the file's positions that each refined vertex is made of, if asked for.
     """
 
     index: int
@@ -70,6 +73,7 @@ class MeshOutcome:
     report: Report | None
     changes: list[Change]
     bends: Bends = NO_BENDS
+    parents: SubdivisionMatrix | None = None
 
     @property
     def degenerate(self) -> int:
@@ -87,9 +91,16 @@ class MeshOutcome:
 
 
 def refined_meshes(
-    upload: Upload, plans: Sequence[MeshPlan], scheme: Scheme, options: Options, course: Course
+    upload: Upload,
+    plans: Sequence[MeshPlan],
+    scheme: Scheme,
+    options: Options,
+    course: Course,
+    parts: frozenset[int] | None = None,
 ) -> Iterator[MeshOutcome]:
     """Refine meshes of an upload; each is yielded inside the part of the course for its writing.
+
+    `parts`, if given, are the primitives to refine, in place of those that the options name.
 
     Raises:
         ServiceError: a mesh is invalid, or cannot be refined.
@@ -97,10 +108,13 @@ def refined_meshes(
     """
     shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
+    chosen = None if parts is not None else chosen_primitives(upload, options)
+    if parts is not None:
+        chosen = {(plan.mesh, n): n in parts for plan in plans for n in plan.primitives}
     for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):
-            yield from _window(upload, window, scheme, options, course, shares)
+            yield from _window(upload, window, scheme, options, course, shares, chosen)
         done += count
 
 
@@ -139,17 +153,23 @@ def _window(
     options: Options,
     course: Course,
     shares: StageShares,
+    chosen: dict[tuple[int, int], bool] | None,
 ) -> Iterator[MeshOutcome]:
     with course.stage("read", 0.0, shares.weld):
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
-    if len(window) > 1:
+    # Rows of a union are numbered anew, and its faces are refined alike.
+    if len(window) > 1 and options.weld == "position" and chosen is None:
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
     for done, place in enumerate(alone):
         with course.part(done / len(alone), (done + 1) / len(alone)):
-            plan = window[place]
-            outcomes[place] = refine_alone(plan, read[place], scheme, options, course, shares)
+            plan, own = window[place], None
+            if chosen is not None:
+                own = [np.full(len(p.corners), chosen[plan.mesh, p.number]) for p in read[place]]
+            outcomes[place] = refine_alone(
+                plan, read[place], scheme, options, course, shares, chosen=own
+            )
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
             with course.part(place / len(window), (place + 1) / len(window)):
@@ -192,7 +212,8 @@ def _together(
                     refined=part.refined,
                     copies=part.copies,
                     report=part.report,
-                    changes=part.changes,
+                    changes=part.changes
+                    + opposed_normals(part.refined, f"/meshes/{window[place].mesh}"),
                     bends=part.bends,
                 )
     return outcomes
@@ -205,11 +226,17 @@ def refine_alone(
     options: Options,
     course: Course,
     shares: StageShares,
+    *,
+    traced: bool = False,
+    chosen: Chosen | None = None,
 ) -> MeshOutcome:
-    """Refine one mesh, given by its primitives."""
+    """Refine one mesh, given by its primitives.
+
+    `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone.
+    """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
-        control = control_mesh(primitives, options.weld_tolerance, options.weld_unit)
+        control = control_mesh(primitives, options)
         creases = creases_of(control, options, scheme)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
@@ -217,12 +244,15 @@ def refine_alone(
     pointer, made = f"/meshes/{plan.mesh}", None
     with course.stage("refine", shares.refine, shares.attributes):
         if not control.is_empty:
-            made = refined_mesh(control, creases, scheme, options, pointer, course)
+            made = refined_mesh(control, creases, scheme, options, pointer, course, traced=traced)
     refined: list[RefinedPrimitive] = []
     with course.stage("attributes", shares.attributes, shares.write):
         if made is not None:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-            refined = refined_primitives(control, made, grid, blend, course)
+            cut = None if chosen is None else cut_faces(control, chosen)
+            refined = refined_primitives(control, made, grid, blend, course, cut)
+            if cut is not None and made.parents is not None:
+                made = replace(made, parents=made.parents.unmoved(cut.still))
     changes = [
         change
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
@@ -233,6 +263,7 @@ def refine_alone(
     if made is not None:
         (misses,) = near_misses(control.mesh, [made.reports[0]["reference_length"]])
         changes += near_miss_changes(misses, pointer)
+        changes += opposed_normals(refined, pointer)
     return MeshOutcome(
         index=plan.mesh,
         primitives=primitives,
@@ -242,4 +273,12 @@ def refine_alone(
         report=None if made is None else made.reports[0],
         changes=changes,
         bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
+        parents=None if made is None or made.parents is None else _in_file(made.parents, control),
     )
+
+
+def _in_file(parents: SubdivisionMatrix, control: ControlMesh) -> SubdivisionMatrix:
+    """Return parents by their numbers in the file, of which the first of each weld counts."""
+    rows = np.concatenate([primitive.rows for primitive in control.primitives])
+    columns = rows[control.vertex_rows()][parents.columns]
+    return replace(parents, columns=columns)

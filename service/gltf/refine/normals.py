@@ -20,7 +20,6 @@ from pns_common.mesh import Mesh
 from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.rows import cross, dot, marked, norm, number_by_first_appearance, unit
-from pns_common.topology import build_topology
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
@@ -260,7 +259,7 @@ def _own_shares_at_border(
 
 def border_vertices(mesh: Mesh) -> Bool[np.ndarray, " V"]:
     """Return the vertices of edges that are not interior."""
-    topology = build_topology(mesh.faces, len(mesh.vertices))
+    topology = mesh.topology()
     return marked(topology.edges[topology.sharp_edges].reshape(-1), topology.vertex_count)
 
 

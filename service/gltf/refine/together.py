@@ -133,7 +133,7 @@ def refine_together(
     primitives, parts = _joined(meshes)
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
-        control = control_mesh(primitives, options.weld_tolerance, options.weld_unit, parts)
+        control = control_mesh(primitives, options, parts)
     able = _able(control, parts)
     if control.is_empty or not able.all():
         return _chosen(able, meshes, pointers, scheme, options, course, shares)

@@ -22,7 +22,9 @@ def test_several_files_go_to_a_folder_under_their_own_names(
 ) -> None:
     (tmp_path / "a.obj").write_bytes(formats.write(part(), "obj"))
     (tmp_path / "b.vrm").write_bytes(part_file.read_bytes())
-    (tmp_path / "broken.ply").write_bytes(b"ply\nformat ascii 1.0\nsomething\nend_header\n")
+    (tmp_path / "broken.ply").write_bytes(
+        b"ply\nformat ascii 1.0\nproperty something\nend_header\n"
+    )
     (tmp_path / "out").mkdir()
     outcome = pns("subdivide", "a.obj", "broken.ply", "b.vrm", "-o", "out", *LOOP)
     assert outcome.code == 1

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import struct
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from service.bodies.sibling_files import ALONE
+from service.errors import UnrefinableError
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
-from service.meshfiles.convert import Written, converted
+from service.meshfiles.convert import Jobs, Written, convert, converted
+from service.meshfiles.flatten import flatten
 from service.meshfiles.mesh_file import COLOUR, MATERIAL, MeshFile
 from service.options import Limits, Options
 from tests.support.gltf import files
@@ -73,6 +76,7 @@ CUBES: dict[str, tuple[str, bytes]] = {
     "off: blanks before the header": ("off", ("\t  OFF8 6 12 # comment\n" + OFF_BODY).encode()),
     "off: counts on lines": ("off", ("OFF\n8\n6\n0\n" + OFF_BODY).encode()),
     "off: no count of edges": ("off", ("OFF\n8 6\n" + OFF_BODY).encode()),
+    "off: no header": ("off", ("# a\n8 6 12\n" + OFF_BODY).encode()),
     "off: one number a line": ("off", ("OFF 8 6 0 " + OFF_BODY).replace(" ", "\n").encode()),
     "off: comments and blank lines": (
         "off",
@@ -91,6 +95,10 @@ CUBES: dict[str, tuple[str, bytes]] = {
         ),
     ),
     "ply: a comment before the format": ("ply", ply().replace(b"ply\n", b"ply\ncomment a\n")),
+    "ply: a line without its keyword": (
+        "ply",
+        ply().replace(b"element face", b"Made by X\nelement face"),
+    ),
     "ply: a comment among the numbers": ("ply", ply().replace(b"3 0 3 2", b"comment b\n3 0 3 2")),
     "ply: lines ended by returns": ("ply", ply().replace(b"\n", b"\r")),
     "ply: strips": ("ply", strips()),
@@ -280,3 +288,37 @@ def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
     (near,) = [change for change in changes if "weld_tolerance" in change["what"]]
     assert near["count"] == len(flat)
     assert read_glb(glb).tail == 0
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "glb"])
+@pytest.mark.parametrize("levels", [1, 2])
+def test_one_material_is_refined_and_its_neighbours_meet_it(target: str, levels: int) -> None:
+    data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
+    whole = formats.read(data, "obj")
+    for name in whole.labels[MATERIAL].names:
+        made = refined(data, "obj", target, levels=levels, material=name).content
+        mesh = flatten(made, "obj", Limits())[0] if target == "glb" else formats.read(made, target)
+        assert is_closed(mesh)
+        if target in ("obj", "glb"):
+            label = mesh.labels[MATERIAL]
+            own = int(whole.labels[MATERIAL].named(name).sum())
+            assert label.named(name).sum() == own * 4**levels
+            assert (~label.named(name)).sum() < (12 - own) * 4**levels
+    with pytest.raises(UnrefinableError, match="m0, m1"):
+        refined(data, "obj", target, material="m2")
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl"])
+def test_a_map_makes_the_refined_positions_of_those_of_the_file(
+    target: str, tmp_path: Path
+) -> None:
+    from scipy.sparse import load_npz
+
+    data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
+    (tmp_path / "in.obj").write_bytes(data)
+    for material in (None, "m1"):
+        jobs = Jobs([tmp_path / "in.obj"], tmp_path / f"out.{target}", map=tmp_path / "map.npz")
+        assert not [*convert(jobs, Options(scheme="loop", material=material), None, Limits())]
+        made = formats.read((tmp_path / f"out.{target}").read_bytes(), target)
+        again = load_npz(tmp_path / "map.npz") @ formats.read(data, "obj").vertices
+        np.testing.assert_allclose(again, made.vertices, atol=1e-6)

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from typing import cast
 
 import pytest
 import trimesh
 
 from pns_common.errors import PnsError
 from pns_common.schemes import loop
-from service.bodies.media import Kind
-from service.bodies.uploads import Sent
 from service.errors import ServiceError
-from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles import formats
+from service.meshfiles.convert import converted
 from service.meshfiles.refine_mesh_file import refine_mesh_file
-from service.meshfiles.to_gltf import as_gltf
+from service.meshfiles.to_gltf import read_within
 from service.options import Limits, Options
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)
@@ -67,8 +64,7 @@ def outcome(data: bytes, kind: str) -> str:
 def status_of(data: bytes, kind: str) -> int:
     """Return what the service would answer, which has it as glTF; other exceptions fail."""
     try:
-        upload = as_gltf(Sent(data, cast(Kind, kind)), LIMITS)
-        subdivide_gltf(upload.data, "glb", OPTIONS, None, LIMITS)
+        converted(data, kind, "glb", OPTIONS, None, LIMITS)
     except ServiceError as refusal:
         return refusal.status
     except PnsError:
@@ -136,11 +132,11 @@ def test_a_face_of_a_vertex_that_there_is_not_is_named(kind: str, text: str, ver
     if kind == "ply":
         data = data.replace(b"int64", b"int" if int(vertex) < 2**31 else b"double")
     with pytest.raises(ServiceError, match=r"face 1 of the (OFF|PLY) file names vertex") as refusal:
-        as_gltf(Sent(data, cast(Kind, kind)), LIMITS)
+        read_within(data, kind, LIMITS)
     assert refusal.value.status == 422
 
 
 def test_a_file_of_lines_has_no_faces() -> None:
     data = b"OFF\n0 2 0\n0 0 0\n1 0 0\n"
     with pytest.raises(ServiceError, match="no faces of three vertices"):
-        as_gltf(Sent(data, "off"), LIMITS)
+        read_within(data, "off", LIMITS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, loop
-from service.meshfiles.mesh_file import UV, of_triangles
+from service.meshfiles.mesh_file import UV, Layer, of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
@@ -69,3 +69,42 @@ def test_a_weld_tolerance_is_counted():
         "what": "vertices joined within weld_tolerance",
         "count": 18,
     } in report["changes"]
+
+
+def slit(opened):
+    """Two squares of an OBJ along a slit whose two sides have vertices of their own."""
+    rows = [(x, y, 0.0) for y in (0, 1) for x in (0, 1)] + [
+        (x, y, 0.0) for y in (1, 2) for x in (0, 1)
+    ]
+    points = np.array(rows)
+    points[4:, 1] += opened
+    return of_triangles(points, np.array([[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6]]))
+
+
+def test_by_index_poses_have_one_numbering_and_by_position_they_need_not():
+    counts = {}
+    for weld in ("position", "index", "off"):
+        made = [
+            refine_mesh_file(
+                slit(gap), loop(), Options(levels=1, weld=weld), Limits(), traced=True
+            )[0]
+            for gap in (0.0, 0.5)
+        ]
+        counts[weld] = [len(mesh.vertices) for mesh in made]
+        if weld != "position":
+            np.testing.assert_array_equal(made[0].corners, made[1].corners)
+            for mesh, gap in zip(made, (0.0, 0.5), strict=True):
+                parents, again = mesh.parents, np.zeros_like(mesh.vertices)
+                values = parents.weights[:, None] * slit(gap).vertices[parents.columns]
+                np.add.at(again, parents.rows, values)
+                np.testing.assert_allclose(again, mesh.vertices, atol=1e-14)
+    assert counts == {"position": [15, 18], "index": [18, 18], "off": [18, 18]}
+
+
+def test_without_welding_seams_of_texture_coordinates_are_borders():
+    mesh = slit(0.0)
+    rows = np.arange(len(mesh.corners)) // 3
+    cut = replace(mesh, layers={UV: Layer(np.eye(4)[:, :2], rows)})
+    for weld, count in (("index", 18), ("off", 24)):
+        made, _ = refine_mesh_file(cut, loop(), Options(levels=1, weld=weld), Limits())
+        assert len(made.vertices) == count

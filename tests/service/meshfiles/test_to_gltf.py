@@ -7,33 +7,32 @@ import tracemalloc
 import pytest
 
 from service.bodies import media
-from service.bodies.uploads import Sent
+from service.bodies.sibling_files import ALONE
 from service.errors import LimitError, UnrefinableError
-from service.meshfiles.example import part_glb
 from service.meshfiles.formats import memory_to_read
-from service.meshfiles.to_gltf import as_gltf
-from service.options import Limits
+from service.meshfiles.to_gltf import as_gltf, read_within
+from service.meshfiles.triangulate import triangulated
+from service.options import Limits, Options
 
 
-def test_a_gltf_passes_as_it_is() -> None:
-    sent = Sent(part_glb(), "glb")
-    assert as_gltf(sent, Limits()) is sent
+def converted(data: bytes, kind: str, limits: Limits | None = None) -> None:
+    mesh = triangulated(read_within(data, kind, limits or Limits()))
+    assert as_gltf(mesh, ALONE, Options()).kind == "glb"
 
 
 @pytest.mark.parametrize("kind", sorted(set(media.KINDS) - set(media.GLTF_KINDS)))
 def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> None:
     # It is no mesh at all: whoever read it would say so.
-    sent = Sent(b"0" * 1000, kind)
     with pytest.raises(LimitError) as refusal:
-        as_gltf(sent, Limits(max_memory_bytes=memory_to_read(b"0" * 1000, kind) - 1))
+        converted(b"0" * 1000, kind, Limits(max_memory_bytes=memory_to_read(b"0" * 1000, kind) - 1))
     assert refusal.value.limit == "memory"
 
 
 @pytest.mark.parametrize("far", ["3.5e38", "-1e300", "inf", "nan"])
 def test_a_position_that_float32_cannot_hold_is_refused(far: str) -> None:
-    sent = Sent(f"v 0 0 {far}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode(), "obj")
+    data = f"v 0 0 {far}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode()
     with pytest.raises(UnrefinableError, match=r"float32|NaN or infinite"):
-        as_gltf(sent, Limits())
+        converted(data, "obj")
 
 
 @pytest.mark.parametrize("shares", [(1.0, 0.0), (0.5, 0.5)])
@@ -44,7 +43,7 @@ def test_an_off_takes_no_more_than_is_predicted_whatever_its_lines_are(
     vertices, faces = (max(int(share * 2**20) // 7, 1) for share in shares)
     data = b"OFF\n%d %d 0\n" % (vertices, faces) + b"0 0 0\n" * vertices + b"3 0 1 2\n" * faces
     tracemalloc.start()
-    as_gltf(Sent(data, "off"), Limits())
+    converted(data, "off")
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < memory_to_read(data, "off")

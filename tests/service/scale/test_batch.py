@@ -213,7 +213,7 @@ def test_a_fault_of_ours_is_told_and_the_rest_goes_on(tmp_path, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("ours")
 
-    monkeypatch.setattr("service.meshfiles.formats.read", broken)
+    monkeypatch.setattr("service.meshfiles.formats.read_polygons", broken)
     batch = batch_of(tmp_path)
     assert refined(batch).failures == [("internal-error", 1)]
     assert "ZeroDivisionError: ours" in rows(batch)["a.obj"]["detail"]
@@ -245,7 +245,7 @@ def test_memory_that_runs_out_costs_its_file_alone(tmp_path, monkeypatch):
     def takes_too_much(*_):
         raise MemoryError
 
-    monkeypatch.setattr("service.meshfiles.formats.read", takes_too_much)
+    monkeypatch.setattr("service.meshfiles.formats.read_polygons", takes_too_much)
     batch = batch_of(tmp_path)
     assert refined(batch).failures == [("limit-exceeded", 1)]
     assert f"{Limits().max_memory_bytes} bytes" in rows(batch)["a.obj"]["detail"]

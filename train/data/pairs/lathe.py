@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from pns_common import Mesh
 from train.data.pairs.faceted import sampled
-from train.data.pairs.references import LATHE, Pair, sharp_edges
+from train.data.pairs.references import Pair, sharp_edges
 from train.surfaces.solids import random_rotation
 
 # Corners that turn by more are meant, radians.
@@ -47,7 +47,7 @@ def lathe_pair(rng: np.random.Generator) -> Pair:
     turn = random_rotation(rng)
     surface = sampled(fine.vertices @ turn, fine.faces, rng)
     sharp = sharp_edges(fine, FINE_SHARP) @ turn
-    return Pair(LATHE, Mesh(coarse.vertices @ turn, coarse.faces), surface, sharp)
+    return Pair("lathe", Mesh(coarse.vertices @ turn, coarse.faces), surface, sharp)
 
 
 def turned(

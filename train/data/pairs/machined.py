@@ -7,7 +7,7 @@ import numpy as np
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold
-from train.data.pairs.references import LEAST_SHARP, MACHINED, Pair, Reference, coarsened
+from train.data.pairs.references import LEAST_SHARP, Pair, Reference, coarsened
 from train.surfaces.brep import Tessellation, tessellated
 from train.surfaces.machined import machined_part
 from train.surfaces.solids import random_rotation
@@ -46,13 +46,13 @@ def machined_pairs(rng: np.random.Generator) -> Iterator[Pair]:
     drawn = tessellated(shape, 1.0, rng.uniform(*DRAWN_ANGLES))
     coarse = Mesh(drawn.vertices @ turn, drawn.faces)
     if len(coarse.faces) <= MOST and is_manifold(coarse):
-        yield Pair(MACHINED, coarse, surface, sharp)
+        yield Pair("machined", coarse, surface, sharp)
     for _ in range(EACH):
         most = min(MOST, len(dense.faces) // 2)
         count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(max(most, FEWEST + 1)))))
         coarse = coarsened(dense.vertices @ turn, dense.faces, count, rng)
         if coarse is not None:
-            yield Pair(MACHINED, coarse, surface, sharp)
+            yield Pair("machined", coarse, surface, sharp)
 
 
 def true_edges(part: Tessellation) -> np.ndarray:

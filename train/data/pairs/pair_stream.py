@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, turned and machined parts, and swept profiles.
+solids of plane faces, turned parts, and machined ones.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,22 +16,20 @@ from train.data.pairs.lathe import lathe_pair
 from train.data.pairs.machined import machined_pairs
 from train.data.pairs.references import Pair, moved, patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
-from train.data.pairs.swept import swept_pair
 
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
         patch_pair: 0.05,
-        grid_pair: 0.08,
-        sphere_pair: 0.04,
+        grid_pair: 0.10,
+        sphere_pair: 0.05,
         faceted_pair: 0.08,
         lathe_pair: 0.10,
-        swept_pair: 0.05,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.22, solid_pairs: 0.38}
+    {machined_pairs: 0.22, solid_pairs: 0.40}
 )
 
 MOST_FACES = 1200

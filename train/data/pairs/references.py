@@ -15,18 +15,6 @@ from train.refining import refine
 from train.surfaces.implicit import unit_normal
 from train.vectors import angle, face_normals
 
-# The kind of control meshes that were made for Loop's surface.
-AUTHORED = "authored"
-
-# The kind of few-faced parts that are to be no sharper than quasi-interpolation leaves them.
-LATHE = "lathe"
-
-# The kind of exact parts with sharp edges.
-MACHINED = "machined"
-
-# The kind of parts of machined surfaces: smooth, most of it bent one way alone.
-SWEPT = "swept"
-
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reference:

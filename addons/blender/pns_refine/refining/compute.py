@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Mesh, Scheme, loop, pns, sharp_edges
+from pns_common import Creases, Mesh, loop, pns, sharp_edges
 from pns_common.creases import NO_CREASES
 from pns_common.limit import limit_positions
 from pns_common.model.session import Model
@@ -27,7 +27,7 @@ from .faces import (
 from .hidden import hide_within
 from .positions import Positions, refine_positions
 from .shown_creases import shown_creases
-from .snapshot import Layer, Refined, Rule, Snapshot, edge_keys
+from .snapshot import Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
 from .votes import vote_at_corners, vote_at_points
 from .watched import WatchedModel
@@ -43,7 +43,7 @@ class Choice:
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
     none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
-    card asks for it. ``quads`` joins the triangles of quads again.
+    card asks for it. ``quads`` joins the triangles of quads again. ``uv_smooth`` is for UV maps.
     """
 
     model: Model | None
@@ -53,6 +53,7 @@ class Choice:
     crease_angle: float | None = None
     crease_lines: bool = True
     quads: bool = False
+    uv_smooth: Smoothing = Smoothing.PRESERVE_BOUNDARIES
 
 
 def compute(
@@ -83,8 +84,6 @@ def compute(
         plain = level_steps(mesh.faces, *counts, *own)
     distance = _distance_from_loop(mesh, choice, plain, positions, bar)
 
-    ratio, gate = _where_it_acted(mesh, scheme, steps, positions, bar)
-
     offsets = snapshot.offsets
     moved = np.concatenate([snapshot.groups, *offsets], axis=1)
     columns = refine_columns(moved, steps)
@@ -100,7 +99,7 @@ def compute(
     used = used_edges(plan.faces, len(steps.final.edges))
     loose = np.flatnonzero(~snapshot.edge_used)
     own_edge = np.r_[edge_parent[used], loose]
-    carry = _Carry(snapshot, choice.levels, steps, plan, own_edge)
+    carry = _Carry(snapshot, choice, steps, plan, own_edge)
     layers = []
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
@@ -119,8 +118,8 @@ def compute(
         groups=np.clip(columns[:, :group_count], 0, 1),
         offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
         layers=hide_within(tuple(layers), faces, edges, own_edge < 0, old, count),
-        ratio=ratio,
-        gate=gate,
+        ratio=_at_later(positions.ratio, steps),
+        gate=_at_later(positions.gate, steps),
         distance=distance,
         normals=positions.normals,
         report=positions.report,
@@ -171,21 +170,12 @@ def _distance_from_loop(
     return np.linalg.norm(positions.points - plain.points, axis=1)
 
 
-def _where_it_acted(
-    mesh: Mesh, scheme: Scheme, steps: Steps, positions: Positions, bar: _Bar
-) -> tuple[Float[np.ndarray, " W"], Float[np.ndarray, " W"]]:
-    """Return ratio and gate of the last learned level; at later vertices, the ends' mean."""
-    learned = scheme.learned_levels
-    if not learned or learned >= len(steps.steps):
-        return positions.ratio, positions.gate
-    first = replace(steps, steps=steps.steps[:learned])
-    acted = refine_positions(mesh, scheme, first, limit=False, progress=bar.within("loop"))
-    ratio, gate = acted.ratio, acted.gate
-    for step in steps.steps[learned:]:
-        ends = step.topology.edges
-        ratio = np.concatenate([ratio, ratio[ends].mean(axis=1)])
-        gate = np.concatenate([gate, gate[ends].mean(axis=1)])
-    return ratio, gate
+def _at_later(values: Float[np.ndarray, " L"], steps: Steps) -> Float[np.ndarray, " W"]:
+    """Carry values from the vertices of a level to the last; new ones have their ends' mean."""
+    for step in steps.steps:
+        if step.topology.vertex_count == len(values):
+            values = np.concatenate([values, values[step.topology.edges].mean(axis=1)])
+    return values
 
 
 def _plan(
@@ -210,7 +200,7 @@ class _Carry:
     """What becomes of a layer: its values at the new points, edges, faces or corners."""
 
     snapshot: Snapshot
-    levels: int
+    choice: Choice
     steps: Steps
     plan: FacePlan
     edge_parent: Int[np.ndarray, " E"]
@@ -245,9 +235,12 @@ class _Carry:
             # Directions are stored roughly: what differs by less than that is no seam.
             same = np.round(values, 3) if layer.unit else None
             creases = self.steps.steps[0].creases
-            values = refine_corners(values, self.snapshot.triangles, self.levels, creases, same)
+            uv = layer.kind == "FLOAT2"
+            smoothing = self.choice.uv_smooth if uv else Smoothing.PRESERVE_BOUNDARIES
+            triangles, levels = self.snapshot.triangles, self.choice.levels
+            values = refine_corners(values, triangles, levels, creases, same, smoothing)
         else:
-            values = vote_at_corners(values, self.levels)
+            values = vote_at_corners(values, self.choice.levels)
         return values[self.plan.corner]
 
 

@@ -9,7 +9,7 @@ from pns_common.parallel import Blocks
 from pns_common.rows import first_places
 from pns_common.topology import Topology, build_topology, halves_of, split_faces
 
-from .snapshot import edge_keys
+from .snapshot import Smoothing, edge_keys
 from .steps import one_level, with_creases
 
 
@@ -19,13 +19,15 @@ def refine_corners(
     levels: int,
     creases: Int[np.ndarray, "N 2"],
     same: Float[np.ndarray, "C J"] | None = None,
+    smoothing: Smoothing = Smoothing.PRESERVE_BOUNDARIES,
 ) -> Float[np.ndarray, "D K"]:
     """Refine values at three corners a face, in faces' order, to those of the faces' children.
 
     Corners of a vertex that agree are one point of a patch, and a seam runs where they differ.
-    Inside a patch Loop's masks are used, as for the vertices; on its border the values stay and
-    edges get their midpoints: so both sides of a seam keep meeting (Blender calls this "keep
-    boundaries"). ``same`` are the values that say whether corners agree, if not ``values``.
+    Inside a patch Loop's masks are used, as for the vertices. ``smoothing`` says which values stay:
+    those on the border, whose edges then get their midpoints, so that both sides of a seam keep
+    meeting; those of a corner of one face alone; none; or all, which is linear. ``same`` are the
+    values that say whether corners agree, if not ``values``.
     """
     patch = patch_points(faces.reshape(-1), values if same is None else same)
     first = first_places(patch, int(patch.max(initial=-1)) + 1)
@@ -42,9 +44,15 @@ def refine_corners(
         if sharp is not None:
             topology = with_creases(topology, sharp)
             sharp = halves_of(topology, topology.crease_edges)
-        finer = one_level(columns, topology)
-        finer[: len(columns)][border] = columns[border]
-        columns = finer
+        if smoothing is Smoothing.NONE:
+            columns = np.concatenate([columns, columns[topology.edges].mean(axis=1)])
+        else:
+            finer = one_level(columns, topology)
+            if smoothing is Smoothing.PRESERVE_CORNERS:
+                border &= np.bincount(patches.reshape(-1), minlength=len(columns)) == 1
+            if smoothing is not Smoothing.SMOOTH_ALL:
+                finer[: len(columns)][border] = columns[border]
+            columns = finer
         patches = split_faces(topology, Blocks())
     return columns[patches.reshape(-1)]
 

@@ -20,7 +20,7 @@ class FacePlan:
     """The faces, and for each of their corners the triangles' corner 3 t + i it stands on."""
 
     faces: Faces
-    corner: Int[np.ndarray, " C"]
+    corner: Int[np.ndarray, " C"] | slice
 
 
 def triangle_faces(final: Topology, parents: Int[np.ndarray, " T"]) -> FacePlan:
@@ -32,7 +32,7 @@ def triangle_faces(final: Topology, parents: Int[np.ndarray, " T"]) -> FacePlan:
         edges=final.corner_edges.astype(np.int64),
         parents=parents,
     )
-    return FacePlan(faces, np.arange(3 * count))
+    return FacePlan(faces, slice(None))
 
 
 def quad_faces(

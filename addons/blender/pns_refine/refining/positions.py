@@ -22,11 +22,11 @@ _Distances = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Refined vertices with the operator's diagnostics and report."""
+    """Refined vertices and the report, with ratio and gate of the last level that corrected."""
 
     points: Float[np.ndarray, "W 3"]
-    ratio: Float[np.ndarray, " W"]
-    gate: Float[np.ndarray, " W"]
+    ratio: Float[np.ndarray, " L"]
+    gate: Float[np.ndarray, " L"]
     normals: Float[np.ndarray, "W 3"] | None
     report: dict[str, Any]
 
@@ -45,7 +45,9 @@ def refine_positions(
         return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
     creases, levels = Creases(steps.steps[0].creases), len(steps.steps)
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
-    return Positions(made.mesh.vertices, made.ratio, made.gate, made.normals, dict(made.report))
+    added = next((step.added for step in reversed(made.steps) if step.added), None)
+    acted = made if added is None else added
+    return Positions(made.mesh.vertices, acted.ratio, acted.gate, made.normals, dict(made.report))
 
 
 def _level_by_level(
@@ -58,7 +60,7 @@ def _level_by_level(
     larger of both.
     """
     length = measure_reference_length(mesh.vertices, mesh.corners)
-    counter = _Counter(progress, steps)
+    counter, acted = _Counter(progress, steps), None
     reports: list[Any] = []
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
@@ -69,6 +71,7 @@ def _level_by_level(
             made = counter.reading(mesh, rule, length, step.soft.with_named(step.mixture.creases))
             points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
             readings.append(_distances(made.report))
+        acted = made if acted is None or scheme.acts_at(depth) else acted
         reports.append(made.report)
         distances.append(_combined(readings, max))
         mesh = Mesh(points, made.mesh.faces)
@@ -79,7 +82,7 @@ def _level_by_level(
         points = limit_positions(mesh.vertices, steps.at_last)
         normals = limit_normals(mesh.vertices, steps.at_last).vertices
     report = _one_report(reports, _combined(distances, sum))
-    return Positions(points, made.ratio, made.gate, normals, report)
+    return Positions(points, acted.ratio, acted.gate, normals, report)
 
 
 def _distances(report: Any) -> _Distances:

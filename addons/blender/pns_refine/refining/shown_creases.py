@@ -37,7 +37,9 @@ def shaded_edges(
     edges = topology.edges[topology.interior][between].astype(np.int64)
     flat = _marked(snapshot, "sharp_face", Domain.FACE, len(snapshot.polygon_corners) - 1)
     marked = snapshot.edges[_marked(snapshot, "sharp_edge", Domain.EDGE, len(snapshot.edges))]
-    hard = flat[polygons].any(axis=1) | np.isin(edge_keys(edges), edge_keys(marked))
+    hard = flat[polygons].any(axis=1)
+    if len(marked):
+        hard |= np.isin(edge_keys(edges), edge_keys(marked))
     return edges, hard
 
 

@@ -31,6 +31,15 @@ class Rule(Enum):
     KEEP = "keep"
 
 
+class Smoothing(Enum):
+    """Values of corners that stay, by the names of Blender's Subdivision Surface for UV maps."""
+
+    NONE = "NONE"
+    PRESERVE_CORNERS = "PRESERVE_CORNERS"
+    PRESERVE_BOUNDARIES = "PRESERVE_BOUNDARIES"
+    SMOOTH_ALL = "SMOOTH_ALL"
+
+
 @dataclass(frozen=True, eq=False)
 class Layer:
     """One attribute: ``values`` (N, K), a row for each element of the domain.

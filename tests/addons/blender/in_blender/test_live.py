@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from live_scene import WATCH, settle, shown, started
-from scene import chosen, cube, evaluated, grid, linked, points_of, refined
+from scene import chosen, cube, evaluated, grid, linked, numbers, points_of, refined
 
 
 def test_the_result_is_shown_and_the_base_is_kept():
@@ -293,17 +293,35 @@ def test_an_object_with_the_modifier_of_another_is_live_once_it_is_refreshed():
     assert np.abs(shown(other) - before).max() > 0.1
 
 
-def test_shape_keys_are_refused_in_words():
-    obj = cube()
+def test_shape_keys_move_what_is_shown_without_a_refresh():
+    obj = grid(4)
     obj.shape_key_add(name="Basis")
-    with pytest.raises(RuntimeError, match="shape keys need one each"):
-        bpy.ops.object.pns_live_add()
-    obj = started(cube("Later"))
-    obj.shape_key_add(name="Basis")
-    for act in (bpy.ops.object.pns_live_refresh, bpy.ops.object.pns_live_apply):
-        with pytest.raises(RuntimeError, match="shape keys need one each"):
-            act()
-    assert obj.data.shape_keys
+    raised = obj.shape_key_add(name='A "key"')
+    raised.points[7].co.z += 1
+    raised.value = 0
+    started(obj)
+    below = shown(obj)
+    raised.value = 0.5
+    obj.data.update()
+    keys = refined(obj).data.shape_keys.key_blocks
+    offset = numbers(keys[1].points, "co", 3) - numbers(keys[0].points, "co", 3)
+    assert offset[7, 2] > 0.4
+    np.testing.assert_allclose(shown(obj) - below, 0.5 * offset, atol=1e-6)
+    raised.points[7].co.z += 1
+    obj.data.update()
+    settle()
+    np.testing.assert_allclose(shown(obj) - below, offset, atol=1e-6)
+
+
+def test_renders_have_levels_of_their_own():
+    obj = started(grid(4), levels=1, render_levels=3)
+    before = shown(obj)
+    for name in ("render_init", "render_cancel", "render_init", "render_complete"):
+        for handler in getattr(bpy.app.handlers, name):
+            handler(bpy.context.scene)
+        count = len(evaluated(obj).polygons)
+        assert count == 32 * 4 ** (3 if name == "render_init" else 1)
+    np.testing.assert_array_equal(shown(obj), before)
 
 
 def test_a_linked_object_is_refused_in_words(tmp_path):

@@ -94,9 +94,6 @@ def test_the_overlay_has_a_legend_only_when_shown():
 def test_live_mode_offers_what_can_be_done():
     obj = grid(4)
     assert drawn(panel.VIEW3D_PT_pns_live) == ["[object.pns_live_add]"]
-    obj.shape_key_add(name="Basis")
-    assert any("Shape keys" in line for line in drawn(panel.VIEW3D_PT_pns_live))
-    obj.shape_key_clear()
     bpy.ops.object.pns_live_add()
     obj.data.pns_live.problem = "no luck"
     lines = drawn(panel.VIEW3D_PT_pns_live)

@@ -49,6 +49,28 @@ def test_keeping_the_original_leaves_it_as_it_was():
     np.testing.assert_array_equal(points_of(obj.data), before)
 
 
+def test_the_result_stands_beside_its_original():
+    obj = cube()
+    obj.scale.x = 3
+    bpy.context.view_layer.update()
+    assert refined(obj).location.x == pytest.approx(6.6)
+    assert refined(obj, beside=False).location.x == 0
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    obj.modifiers.new("Rig", "ARMATURE").object = rig
+    assert refined(obj).location.x == 0
+
+
+def test_a_subdivision_surface_is_switched_off_where_that_is_asked_for():
+    obj = cube()
+    obj.modifiers.new("Rounder", "SUBSURF")
+    new = refined(obj, levels=1)
+    assert len(evaluated(new).polygons) == 48 * 3
+    assert bpy.ops.object.pns_subsurf_off() == {"FINISHED"}
+    assert len(evaluated(new).polygons) == 48
+    assert not bpy.ops.object.pns_subsurf_off.poll()
+    assert obj.modifiers["Rounder"].show_viewport
+
+
 def test_without_the_original_the_object_stays_itself():
     obj = cube()
     assert refined(obj, keep_original=False, levels=1) == obj

@@ -1,11 +1,13 @@
 """What hangs on points, edges, faces and corners, where it comes from and what it becomes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addons.blender.pns_refine.refining.compute import SHARES, Choice, compute
-from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule
-from pns_common import load_model
+from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule, Smoothing
+from pns_common import Mesh, load_model, loop, refine
 from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, grid, snapshot
 
 
@@ -210,3 +212,35 @@ def test_vertices_that_only_look_joined_are_counted():
     assert compute(apart, Choice(None, 1)).split_vertices == 4
     assert compute(cube(), Choice(None, 1)).split_vertices == 0
     assert compute(grid(2), Choice(None, 1)).split_vertices == 0
+
+
+@pytest.mark.parametrize("smoothing", list(Smoothing))
+def test_uv_maps_are_smoothed_as_asked(smoothing):
+    shape = grid(4)
+    values = shape.points[:, :2][shape.triangles].reshape(-1, 2)
+    layer = Layer("UV", "FLOAT2", Domain.CORNER, Rule.BLEND, values)
+    triangles = replace(
+        shape,
+        corners=np.arange(3 * len(shape.triangles)).reshape(-1, 3),
+        polygons=np.arange(len(shape.triangles)),
+        polygon_corners=3 * np.arange(len(shape.triangles) + 1),
+        layers=(layer,),
+    )
+    made = compute(triangles, Choice(None, 2, uv_smooth=smoothing))
+    uv = np.zeros((len(made.points), 2))
+    uv[made.faces.vertices] = made.layers[0].values
+    mesh = Mesh(np.pad(shape.points[:, :2], [(0, 0), (0, 1)]), shape.triangles)
+    loops = refine(mesh, loop(), 2).mesh.vertices[:, :2]
+    flat = mesh.vertices[:, :2]
+    stays = np.isclose(uv[: len(flat)], flat).all(axis=1)
+    alone = np.bincount(shape.triangles.reshape(-1)) == 1
+    border = np.abs(np.abs(flat).max(axis=1) - np.abs(flat).max()) < 1e-9
+    if smoothing is Smoothing.SMOOTH_ALL:
+        np.testing.assert_allclose(uv, loops, atol=1e-12)
+    elif smoothing is Smoothing.NONE:
+        assert stays.all()
+    else:
+        assert stays[border if smoothing is Smoothing.PRESERVE_BOUNDARIES else alone].all()
+    if smoothing is Smoothing.PRESERVE_CORNERS:
+        moved = np.abs(loops[: len(flat)] - flat).max(axis=1) > 1e-9
+        assert not stays[border & moved & ~alone].any()

@@ -1,0 +1,297 @@
+"""Refine polygons as polygons, by Catmull–Clark: quads come out, and what corners and faces carry.
+
+Values at corners follow the split of the faces that they are at: those of one vertex with one value
+stay one, so seams stay seams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from pns_common.creases import Creases
+from pns_common.errors import MeshError
+from pns_common.mesh import Mesh
+from pns_common.normals import angle_weighted_normals, smooth_fans
+from pns_common.parallel import Blocks, available_threads
+from pns_common.refinement import Refinement, refine
+from pns_common.rows import distinct_rows, number_by_first_appearance
+from pns_common.schemes import CATMULL_CLARK, Scheme
+from pns_common.topology import EdgeClass, Topology, build_topology
+
+from ..advice import count_bends
+from ..course import Course
+from ..errors import UnrefinableError
+from ..gltf.refine.mesh_refine import GATE, RATIO
+from ..gltf.refine.near_misses import near_miss_changes, near_misses
+from ..gltf.refine.normals import safe_unit
+from ..meshes.shape_creases import creases_by_shape
+from ..meshes.weld import Weld, weld, weld_by_label
+from ..meshes.weld_tolerance import weld_within
+from ..options import Limits, Options
+from ..report import Change, MeshResult, build_report
+from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
+from .parts import with_group_normals
+from .refine_mesh_file import check_cost
+
+# All four triangles of a quad: its normal does not depend on a diagonal.
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+
+
+@dataclass(frozen=True, eq=False)
+class _Control:
+    """Polygons to refine.
+
+    Attributes:
+        mesh: welded.
+        places: (H,) which corner of the file each of its corners is.
+        faces: (F,) which face of the file each of its faces is.
+        vertices: (V,) a vertex of the file at each of its vertices.
+        near: vertices that were joined within the tolerance.
+    """
+
+    mesh: Mesh
+    places: Int[np.ndarray, " H"]
+    faces: Int[np.ndarray, " F"]
+    vertices: Int[np.ndarray, " V"]
+    near: int
+
+
+def refine_polygons(
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    course: Course,
+    *,
+    traced: bool = False,
+) -> tuple[MeshFile, dict[str, Any]]:
+    """Refine polygons; return also the report. `traced` asks for the parents of vertices.
+
+    Raises:
+        LimitError: over `max_faces` or `max_memory_bytes`.
+        UnrefinableError: no face of three different vertices, or one that cannot be refined.
+    """
+    check_cost(mesh, options, limits)
+    shaded = with_group_normals(mesh)
+    with course.stage("weld", 0.0, 0.1):
+        control = _control(shaded, options)
+        creases = _creases(control, shaded, options, scheme)
+    with course.stage("refine", 0.1, 0.7):
+        try:
+            made = refine(
+                control.mesh,
+                scheme,
+                options.levels,
+                options.reference_length,
+                limit=options.limit,
+                creases=creases,
+                progress=lambda done, total: course.reach(done / total),
+            )
+        except MeshError as error:
+            raise UnrefinableError(str(error)) from error
+    with course.stage("attributes", 0.7, 1.0):
+        refined = _with_layers(shaded, control, made, options)
+        if NORMAL not in mesh.layers and options.normals in ("auto", "keep"):
+            layers = {name: own for name, own in refined.layers.items() if name != NORMAL}
+            refined = replace(refined, layers=layers)
+    parents = None
+    if traced:
+        parents = made.parents
+        shape = (parents.shape[0], len(mesh.vertices))
+        parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
+    return replace(refined, parents=parents), _report(mesh, control, creases, made, options)
+
+
+def _control(mesh: MeshFile, options: Options) -> _Control:
+    """Weld vertices; drop corners that repeat the one before, and faces of fewer than three."""
+    welded, near = _welded(mesh, options)
+    corner = welded.faces.reshape(-1)
+    follow = np.arange(1, len(corner) + 1)
+    follow[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
+    differs = corner != corner[follow]
+    sizes = np.add.reduceat(differs, mesh.offsets[:-1], dtype=np.int64)
+    faces = np.flatnonzero(sizes >= 3)
+    if not len(faces):
+        raise UnrefinableError("no face has three different vertices")
+    kept = differs & np.repeat(sizes >= 3, mesh.sizes)
+    places = np.flatnonzero(kept)
+    number, first = number_by_first_appearance(corner[places])
+    points = welded.points[corner[places[first]]]
+    try:
+        made = Mesh(points, (number, offsets_of(sizes[faces])))
+    except MeshError as error:
+        raise UnrefinableError(str(error)) from error
+    return _Control(made, places, faces, mesh.corners[places[first]], near)
+
+
+def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
+    """Weld corners, one a row; return also how many vertices the tolerance joined."""
+    if options.weld == "position":
+        exact = weld(mesh.vertices, mesh.corners[:, None])
+        near = weld_within(exact, options.weld_tolerance, options.weld_unit, None)
+        return near, len(exact.points) - len(near.points)
+    labels = mesh.corners
+    if options.weld == "off":
+        rows = [layer.rows for layer in mesh.layers.values()]
+        labels = distinct_rows(np.stack([mesh.corners, *rows], axis=1))
+    corners = np.arange(len(labels))[:, None]
+    return weld_by_label(mesh.vertices[mesh.corners], corners, labels), 0
+
+
+def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
+    if options.crease == "normals":
+        return Creases(_hard_edges(control, mesh), border=options.border)
+    return replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+
+
+def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
+    """Return the interior edges whose two faces carry different normals at both ends."""
+    normals = mesh.layers.get(NORMAL)
+    topology = control.mesh.topology()
+    edges = topology.edges[topology.interior].astype(np.int64)
+    if normals is None:
+        return edges[:0]
+    row = distinct_rows(normals.values)[normals.rows[control.places]]
+    row[normals.rows[control.places] < 0] = NONE
+    there, back = topology.half_edges[topology.interior].T
+    offsets = control.mesh.offsets
+    follow = np.arange(1, len(row) + 1)
+    follow[offsets[1:] - 1] = offsets[:-1]
+    hard = np.ones(len(edges), dtype=bool)
+    for one, other in ((there, follow[back]), (follow[there], back)):
+        hard &= (row[one] >= 0) & (row[other] >= 0) & (row[one] != row[other])
+    return edges[hard]
+
+
+def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
+    """Return the refined mesh with all that the file's corners and faces carry."""
+    corners = made.mesh.corners
+    counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
+    of_face = np.repeat(control.faces, counts)
+    layers: dict[str, Layer] = {}
+    for name, layer in mesh.layers.items():
+        layers[name] = _refined(name, layer, control, options)
+    if options.normals == "smooth":
+        layers[NORMAL] = _smooth_normals(made)
+    elif NORMAL in layers:
+        layers[NORMAL] = _normals(made.mesh.vertices, made.mesh.faces, layers[NORMAL].rows)
+    if made.normals is not None and options.normals == "limit":
+        layers[NORMAL] = Layer(made.normals, corners)
+    if options.diagnostics == "full":
+        scalars = {RATIO: made.ratio, GATE: made.gate}
+        layers |= {
+            name: Layer(np.array(values)[:, None], corners) for name, values in scalars.items()
+        }
+    return MeshFile(
+        made.mesh.vertices,
+        made.mesh.offsets,
+        corners,
+        layers,
+        {name: values[of_face] for name, values in mesh.face_values.items()},
+        {kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
+        mesh.libraries,
+        mesh.double,
+    )
+
+
+def _refined(name: str, layer: Layer, control: _Control, options: Options) -> Layer:
+    """Refine values at corners: corners of one vertex with one value stay one."""
+    rows = layer.rows[control.places]
+    values, offsets = layer.values, control.mesh.offsets
+    bare = np.logical_or.reduceat(rows < 0, offsets[:-1])
+    label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
+    number, first = number_by_first_appearance(label)
+    column = values[np.maximum(rows[first], 0)]
+    topology = build_topology((number, offsets), len(first))
+    for depth in range(options.levels):
+        if depth:
+            topology = CATMULL_CLARK.split(topology, Blocks())
+        column = _placed(name, column, topology, smooth=name == UV and options.uv == "smooth")
+    corners = CATMULL_CLARK.faces(topology, Blocks(), np.int64).reshape(-1)
+    if bare.any():
+        counts = 4 * np.diff(offsets) * 4 ** (options.levels - 1)
+        corners = np.where(np.repeat(bare, counts), NONE, corners)
+    if column.dtype != values.dtype:
+        column = np.rint(column) if values.dtype.kind in "ui" else column
+    return Layer(column.astype(values.dtype), corners)
+
+
+def _placed(
+    name: str, column: Shaped[np.ndarray, "N K"], mesh: Topology, *, smooth: bool
+) -> Shaped[np.ndarray, "M K"]:
+    """Return values at old vertices, edges and faces: linear, or those of whole numbers."""
+    a, b = mesh.edges.T
+    starts = mesh.offsets[:-1]
+    if column.dtype.kind != "f" and name != COLOUR:
+        return np.concatenate([column, column[a], column[mesh.corners[starts]]])
+    column = column.astype(np.float64)
+    if smooth:
+        rim = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)
+        made = CATMULL_CLARK.place(column, mesh, Blocks(available_threads()))
+        made[rim] = column[rim]
+        return made
+    sums = np.add.reduceat(column[mesh.corners], starts, axis=0)
+    return np.concatenate(
+        [column, (column[a] + column[b]) / 2, sums / np.diff(mesh.offsets)[:, None]]
+    )
+
+
+def _normals(
+    vertices: Float[np.ndarray, "V 3"],
+    quads: Int[np.ndarray, "F 4"],
+    groups: Int[np.ndarray, " C"],
+) -> Layer:
+    """Return the normals of groups of corners of quads; corners of no group have none."""
+    own = np.where(groups >= 0, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
+    number, _ = number_by_first_appearance(own)
+    count, blocks = int(number.max()) + 1, Blocks(available_threads())
+    groups_of = number.reshape(-1, 4)
+    normals = angle_weighted_normals(vertices, quads, groups_of, count, blocks, TRIANGLES)
+    return Layer(safe_unit(normals), np.where(groups >= 0, number, NONE))
+
+
+def _smooth_normals(made: Refinement) -> Layer:
+    """Return normals that are smooth but across the edges that are sharp at the last level."""
+    last, sharp = made.topologies[-1], None
+    if len(last.crease_edges):
+        fine = CATMULL_CLARK.split(last, Blocks())
+        sharp = fine.edges[fine.crease_edges].astype(np.int64)
+    vertices, quads = made.mesh.vertices, made.mesh.faces
+    triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    fans = smooth_fans(triangles, len(vertices), sharp).reshape(-1, 6)
+    return _normals(vertices, quads, fans[:, [0, 1, 2, 5]].reshape(-1))
+
+
+def _report(
+    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
+) -> dict[str, Any]:
+    (misses,) = near_misses(control.mesh, [made.reference_length])
+    told = {
+        "vertices joined within weld_tolerance": control.near,
+        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
+    }
+    changes = [*mesh.changes, *(Change("", what, count) for what, count in told.items() if count)]
+    used = len(np.unique(mesh.corners))
+    lost = used - len(np.unique(mesh.corners[np.isin(_faces_of(mesh), control.faces)]))
+    result = MeshResult(
+        index=0,
+        instances=1,
+        primitives=1,
+        vertices=len(made.mesh.vertices),
+        faces=made.mesh.face_count,
+        degenerate=len(mesh.sizes) - len(control.faces),
+        copies=0,
+        report=made.report,
+        bends=count_bends(control.mesh, creases)[0],
+    )
+    changes += near_miss_changes(misses, "")
+    return build_report(made.scheme, options.levels, [result], lost, changes)
+
+
+def _faces_of(mesh: MeshFile) -> Int[np.ndarray, " C"]:
+    """Return the face of each corner."""
+    return np.repeat(np.arange(len(mesh.sizes)), mesh.sizes)

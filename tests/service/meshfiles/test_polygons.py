@@ -1,0 +1,134 @@
+"""Polygons in, quads out: by Catmull–Clark, with all that corners and faces carry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, load_model, refine
+from pns_common.schemes import catmull_clark
+from service.errors import InvalidParameter
+from service.meshfiles import formats
+from service.meshfiles.convert import Written, converted
+from service.meshfiles.mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, UV
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.shared import shared_path
+
+CORNERS = [(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+QUADS = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+
+
+def cube(behind: str = "") -> bytes:
+    """Six sides, each with texture coordinates of its own, of two materials and groups."""
+    text = "mtllib no.mtl\n" + "".join(f"v {x} {y} {z} 1 0 0\n" for x, y, z in CORNERS)
+    text += "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + behind
+    for number, quad in enumerate(QUADS):
+        text += f"usemtl m{number % 2}\ng g{number // 3}\n"
+        text += "f " + " ".join(f"{v + 1}/{k + 1}" for k, v in enumerate(quad)) + "\n"
+    return text.encode()
+
+
+def made(data: bytes, kind: str, target: str, **options: Any) -> Written:
+    given: dict[str, Any] = {"levels": 1} | options
+    return converted(data, kind, target, Options(**given), None, Limits())
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off"])
+@pytest.mark.parametrize("levels", [1, 2])
+def test_quads_are_those_of_catmull_clark(target: str, levels: int) -> None:
+    written = made(cube(), "obj", target, levels=levels)
+    mesh = formats.read_polygons(written.content, target)
+    wanted = refine(Mesh(np.array(CORNERS, float), np.array(QUADS)), catmull_clark(), levels).mesh
+    assert written.report["scheme"] == "catmull-clark"
+    assert written.faces == len(mesh.sizes) == 6 * 4**levels
+    assert (mesh.sizes == 4).all()
+    np.testing.assert_allclose(
+        mesh.vertices[mesh.corners], wanted.vertices[wanted.faces.reshape(-1)], atol=1e-6
+    )
+    # Each side's coordinates stay a square of their own.
+    uv = mesh.layers[UV].values[mesh.layers[UV].rows].reshape(6, -1, 2)
+    steps = np.arange(2**levels + 1) / 2**levels
+    grid = {(a, b) for a in steps for b in steps}
+    assert all({tuple(row) for row in side} == grid for side in uv.round(9).tolist())
+    assert (mesh.layers[COLOUR].values[mesh.layers[COLOUR].rows][:, 0] > 0).all()
+    if target == "obj":
+        for kind, names in ((MATERIAL, ("m0", "m1")), (GROUP, ("g0", "g1"))):
+            label = mesh.labels[kind]
+            assert label.names == names
+            assert np.bincount(label.of_face).tolist() == [3 * 4**levels] * 2
+        assert mesh.libraries == ("no.mtl",)
+
+
+@pytest.mark.parametrize("compress", ["none", "meshopt"])
+def test_a_glb_says_which_triangles_are_a_quad(compress: str) -> None:
+    """FB_ngon_encoding: triangles of a polygon begin alike, those of the next one otherwise."""
+    written = made(cube(), "obj", "glb", levels=2, compress=compress)
+    tree, binary = files.unpack(written.content)
+    assert tree["extensionsUsed"][0] == "FB_ngon_encoding"
+    quads = 0
+    for primitive in tree["meshes"][0]["primitives"]:
+        assert primitive["extensions"]["FB_ngon_encoding"] == {}
+        assert {"NORMAL", "TEXCOORD_0", "COLOR_0"} <= primitive["attributes"].keys()
+        if compress != "none":
+            continue
+        triangles = files.values_of(tree, binary, primitive["indices"]).reshape(-1, 3)
+        first = triangles[:, 0]
+        assert (first[::2] == first[1::2]).all()
+        assert (first[1:-1:2] != first[2::2]).all()
+        assert (triangles[::2, 2] == triangles[1::2, 1]).all()
+        quads += len(triangles) // 2
+    assert quads in (0, 96)
+    assert tree["asset"]["extras"]["pns"]["totals"]["faces"] == 96
+
+
+def test_seams_hard_edges_and_smoothing_groups_are_kept() -> None:
+    hard = made(cube("s 1\n").replace(b"usemtl m1", b"s off\nusemtl m1"), "obj", "glb")
+    tree, binary = files.unpack(hard.content)
+    for primitive in tree["meshes"][0]["primitives"]:
+        normals = files.values_of(tree, binary, primitive["attributes"]["NORMAL"])
+        assert len(normals) == 3 * 9
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+    round_ = made(cube(), "obj", "obj", normals="smooth", crease="angle:60", levels=2)
+    mesh = formats.read_polygons(round_.content, "obj")
+    assert np.abs(mesh.vertices).max() == 1
+    normals = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows]
+    assert (np.abs(np.abs(normals).max(axis=1) - 1) < 1e-6).all()
+
+
+def test_each_scheme_takes_polygons_as_it_says() -> None:
+    counts = {
+        scheme: converted(
+            cube(), "obj", "obj", Options(levels=1, scheme=scheme), load_model(), Limits()
+        ).faces
+        for scheme in ("auto", "pns", "loop", "catmull-clark")
+    }
+    assert counts == {"auto": 24, "pns": 48, "loop": 48, "catmull-clark": 24}
+    triangles = made(cube(), "obj", "obj", scheme="loop").content
+    assert made(triangles, "obj", "obj", scheme="catmull-clark").faces == 3 * 48
+    with pytest.raises(InvalidParameter, match="material"):
+        made(cube(), "obj", "obj", scheme="catmull-clark", material="m0")
+    glb = made(cube(), "obj", "glb").content
+    with pytest.raises(InvalidParameter, match="catmull-clark"):
+        made(glb, "glb", "glb", scheme="catmull-clark")
+
+
+@pytest.mark.parametrize(
+    ("name", "quads"),
+    [("concave_ngon_obj.obj", 48), ("concave_ngon_ply.ply", 48), ("dart_quad.obj", 4)],
+)
+def test_the_collections_concave_polygons_stay_whole(name: str, quads: int) -> None:
+    path = shared_path("cases") / name
+    written = made(path.read_bytes(), path.suffix[1:], path.suffix[1:])
+    assert written.faces == quads
+
+
+def test_faces_that_are_none_are_dropped_and_reported() -> None:
+    text = cube() + b"v 0 0 9\nf 1 1 2 2\nf 1 2 2 3 9\nf 4 5 6\n"
+    report = made(text, "obj", "obj").report
+    assert report["dropped"]["degenerate_faces"] == 1
+    assert {"pointer": "", "what": "repeated corners dropped", "count": 1} in report["changes"]
+    by_index = made(text, "obj", "obj", weld="index").report
+    assert by_index["totals"]["faces"] == report["totals"]["faces"] == 24 + 4 + 3

@@ -1,0 +1,321 @@
+"""Simplified dense shapes of seven kinds, refined by all methods and compared with the truth."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from jaxtyping import Int
+from rich.console import Console
+
+from pns_common import Mesh, load_model, loop, pns
+from pns_common import sharp_edges as found_sharp_edges
+from pns_common.model.card import ModelCard
+from pns_common.model.session import Model
+from train.baselines.butterfly import modified_butterfly
+from train.baselines.controls import flat, n1
+from train.baselines.pn_triangles import pn_triangles
+from train.connectivity import connect
+from train.data.pairs.references import Pair, Reference
+from train.data.sharp_labels import coarse_sharp_edges
+from train.data.validation import Drawn, coarse_mesh, read_shape, validation_meshes
+from train.experiments.beyond.models import models_and_assets
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
+from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.reproduce import formatted
+from train.metrics.self_intersection import crossing_faces
+from train.metrics.surface_distance import SurfaceErrors, gain, prepared, surface_errors
+from train.metrics.whole_surface import normal_jump
+from train.refining import AnyScheme, refine
+
+LEVELS, SAMPLES = 2, 5000
+
+LOOP, FLAT, OURS, ZERO = "Loop", "Flat", "PNS", "PNS, networks at zero"
+
+# Degrees at which PN triangles split normals.
+SPLIT = 40.0
+
+ALL = "all"
+
+NOTE = (
+    "Each dense shape is simplified to three coarse meshes, by three of six simplifiers, to about "
+    f"700 or 2,500 faces, refined at {LEVELS} levels and compared with the dense mesh both ways: "
+    f"distances of {SAMPLES:,} points evenly by area, the largest also of all vertices, and angles "
+    "between normals. A number is the mean over meshes of the improvement over Loop. *Excess* is "
+    "how far the largest angle between neighbouring faces exceeds the dense mesh's own, mean in "
+    "degrees. *Crossing* is the number of faces that pass through others, over the larger of "
+    "Loop's and the control mesh's, summed. *Precision* and *recall* are of the coarse edges that "
+    "are sharp in truth, on parts and buildings."
+)
+
+
+@dataclass(frozen=True)
+class ZeroNetworks:
+    """A model whose corrections are all zero; its card and its sharp edges are its own."""
+
+    model: Model
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.model, name)
+
+    @property
+    def card(self) -> ModelCard:
+        """The model's own card."""
+        return self.model.card
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+        return self.model.name
+
+    @property
+    def hash(self) -> str:
+        """The model's hash."""
+        return self.model.hash
+
+    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
+        """Return no correction of edges."""
+        return np.zeros((len(features), 3), dtype=np.float32)
+
+    def vertex_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
+        """Return no correction of vertices."""
+        return np.zeros((len(features), 3), dtype=np.float32)
+
+    def sharpness(self, features: np.ndarray) -> np.ndarray:
+        """Return the model's own sharpness of edges."""
+        return self.model.sharpness(features)
+
+
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """A method, and the edges of a coarse mesh that it takes for sharp, if it takes any."""
+
+    scheme: AnyScheme
+    sharp: Callable[[Mesh], Int[np.ndarray, "N 2"]] | None = None
+
+
+def contenders(model: Model) -> dict[str, Contender]:
+    """Return all methods by the names of the table, Loop first."""
+    ours, zero = pns(model), pns(ZeroNetworks(model))
+    return {
+        LOOP: Contender(loop()),
+        FLAT: Contender(flat()),
+        "PN triangles, 40°": Contender(
+            pn_triangles(SPLIT), partial(found_sharp_edges, angle=SPLIT)
+        ),
+        "Butterfly": Contender(modified_butterfly()),
+        "N1": Contender(n1()),
+        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
+        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One method on one coarse mesh.
+
+    Attributes:
+        excess: of the largest turn over the truth's largest, degrees.
+        found, right, true: edges taken for sharp, those that are, and all that are; None where
+            the truth's are not known, or none are taken.
+    """
+
+    mesh: str
+    kind: str
+    simplifier: str
+    faces: int
+    method: str
+    errors: SurfaceErrors
+    excess: float
+    crossing: int
+    found: int | None
+    right: int | None
+    true: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One method over all coarse meshes of one kind."""
+
+    kind: str = column("Kind")
+    meshes: int = column("Meshes", "d")
+    method: str = column("Method")
+    mean_percent: float = column("Mean %", "+.1f")
+    p95_percent: float = column("p95 %", "+.1f")
+    largest_percent: float = column("Largest %", "+.1f")
+    normal_percent: float = column("Normals %", "+.1f")
+    excess: float = column("Excess °", ".1f")
+    crossing: float = column("Crossing", ".2f")
+    worse_mean: int = column("Worse in mean", "d")
+    worse_normal: int = column("Worse in normals", "d")
+    precision: float | None = column("Precision", ".2f")
+    recall: float | None = column("Recall", ".2f")
+
+
+@dataclass(frozen=True, slots=True)
+class EachRow:
+    """One method on one coarse mesh."""
+
+    mesh: str = column("Mesh")
+    kind: str = column("Kind")
+    simplifier: str = column("Simplifier")
+    faces: int = column("Faces", "d")
+    method: str = column("Method")
+    mean: float = column("Mean distance", ".3g")
+    p95: float = column("95th percentile", ".3g")
+    largest: float = column("Largest", ".3g")
+    normal: float = column("Normals", ".4f")
+    excess: float = column("Excess °", ".1f")
+    crossing: int = column("Crossing", "d")
+
+
+def measured(drawn: Sequence[Drawn], methods: Mapping[str, Contender]) -> list[Measured]:
+    """Measure all methods on coarse meshes of one shape."""
+    shape = read_shape(drawn[0].path, drawn[0].kind)
+    true, turn = prepared(shape.mesh, SAMPLES), normal_jump(shape.mesh)
+    surface = Reference(true.points, true.normals[true.faces])
+    rows = []
+    for each in drawn:
+        coarse = coarse_mesh(shape, each)
+        if coarse is None:
+            continue
+        sharp = None
+        if shape.sharp is not None:
+            sharp = coarse_sharp_edges(Pair(shape.kind, coarse, surface, shape.sharp))
+        for name, method in methods.items():
+            mesh = refine(coarse, method.scheme, LEVELS).mesh
+            rows.append(
+                Measured(
+                    shape.name,
+                    shape.kind,
+                    each.simplifier,
+                    len(coarse.faces),
+                    name,
+                    surface_errors(true, prepared(mesh, SAMPLES)),
+                    float(np.degrees(max(normal_jump(mesh) - turn, 0.0))),
+                    crossing_faces(mesh),
+                    *_counted(coarse, method, sharp),
+                )
+            )
+    return rows
+
+
+def _counted(
+    mesh: Mesh, method: Contender, sharp: np.ndarray | None
+) -> tuple[int, int, int] | tuple[None, None, None]:
+    """Return how many edges are taken for sharp, how many of them are, and how many are at all."""
+    if method.sharp is None or sharp is None:
+        return None, None, None
+    edges, count = connect(mesh.faces, len(mesh.vertices)).edges.numpy(), len(mesh.vertices)
+    found = np.sort(method.sharp(mesh), axis=1)
+    taken = np.isin(edges @ [count, 1], found @ [count, 1])
+    return int(taken.sum()), int((taken & sharp).sum()), int(sharp.sum())
+
+
+def summary(measured: Sequence[Measured]) -> list[Summary]:
+    """Return one row for each kind and method, and for all kinds together at the end."""
+    rows = []
+    kinds = [*dict.fromkeys(row.kind for row in measured), ALL]
+    for kind in kinds:
+        own = [row for row in measured if kind in (row.kind, ALL)]
+        by_method = {
+            method: [row for row in own if row.method == method]
+            for method in dict.fromkeys(row.method for row in own)
+        }
+        loops, flats = by_method[LOOP], by_method[FLAT]
+        allowed = sum(max(a.crossing, b.crossing) for a, b in zip(loops, flats, strict=True))
+        for method, these in by_method.items():
+            gains = [gain(a.errors, b.errors) for a, b in zip(loops, these, strict=True)]
+            found, right, true = (
+                sum(getattr(row, name) or 0 for row in these) for name in ("found", "right", "true")
+            )
+            rows.append(
+                Summary(
+                    kind,
+                    len(these),
+                    method,
+                    *(
+                        float(np.mean([percents[name] for percents in gains]))
+                        for name in ("mean", "p95", "hausdorff", "normal")
+                    ),
+                    excess=float(np.mean([row.excess for row in these])),
+                    crossing=sum(row.crossing for row in these) / max(allowed, 1),
+                    worse_mean=sum(percents["mean"] < 0 for percents in gains),
+                    worse_normal=sum(percents["normal"] < 0 for percents in gains),
+                    precision=right / found if found else None,
+                    recall=right / true if true else None,
+                )
+            )
+    return rows
+
+
+def validate(
+    folder: Path, model: Path | None, most: int | None, processes: int = 1
+) -> list[Measured]:
+    """Measure all methods on validation meshes; a model file stands for the bundled default."""
+    drawn = sorted(validation_meshes(folder, most), key=lambda each: each.path)
+    shapes = [list(group) for _, group in groupby(drawn, key=lambda each: each.path)]
+    if processes == 1:
+        return [row for shape in shapes for row in _of_shape(shape, model)]
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        rows = pool.map(_of_shape, shapes, [model] * len(shapes))
+        return [row for of_shape in rows for row in of_shape]
+
+
+def _of_shape(drawn: Sequence[Drawn], model: Path | None) -> list[Measured]:
+    return measured(drawn, contenders(load_model() if model is None else load_model(model)))
+
+
+def validate_command(
+    assets: Annotated[Path, typer.Argument(help="Folder of dense meshes.", exists=True)],
+    model: Annotated[Path | None, typer.Option(help="Model file; the default if none.")] = None,
+    meshes: Annotated[int | None, typer.Option(help="At most so many meshes.")] = None,
+    processes: Annotated[int, typer.Option(min=1, help="Shapes at once.")] = 2,
+) -> None:
+    """Print the validation table of a model."""
+    made = table("validation", "", Summary, summary(validate(assets, model, meshes, processes)))
+    console = Console(width=200)
+    for cells in ([each.heading for each in made.columns], *made.rows):
+        texts = [
+            cell if isinstance(cell, str) else formatted(cell, each)
+            for cell, each in zip(cells, made.columns, strict=True)
+        ]
+        console.print(f"{texts[0]:9} {texts[2]:22}" + "".join(f"{t[:10]:>11}" for t in texts[3:]))
+
+
+def run(laboratory: Laboratory) -> Outcome:
+    """Measure on the folder `dense` of the assets."""
+    assert laboratory.assets is not None  # needs_assets
+    most = min(laboratory.scale.instances, len(validation_meshes(laboratory.assets / "dense")))
+    rows = validate(laboratory.assets / "dense", None, most)
+    return Outcome(
+        (
+            table("validation", "Simplified shapes", Summary, summary(rows)),
+            table("validation_each", "Each mesh", EachRow, map(_row, rows)),
+        ),
+        notes=(NOTE,),
+    )
+
+
+def _row(row: Measured) -> EachRow:
+    errors = row.errors
+    distances = errors.mean, errors.p95, errors.hausdorff, errors.normal
+    place = row.mesh, row.kind, row.simplifier, row.faces, row.method
+    return EachRow(*place, *distances, row.excess, row.crossing)
+
+
+EXPERIMENT = Experiment(
+    name="validation",
+    title="Simplified shapes: validation",
+    source="Beyond the paper. The validation set, on which the default model is chosen.",
+    run=run,
+    seconds=400,
+    needs_assets=True,
+    reads=models_and_assets,
+)
