@@ -56,10 +56,13 @@ class Curves:
     shared: Bool[np.ndarray, " W"]
 
 
-def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
-    """Find the curves of a mesh."""
+def find_curves(
+    points: Float[np.ndarray, "V 3"], mesh: Topology, row_count: int | None = None
+) -> Curves:
+    """Find the curves of a mesh; ``row_count`` counts all vertices of the refined mesh."""
     count, kinds, sharp = mesh.vertex_count, mesh.edge_class, mesh.sharpest
-    shared = np.zeros(count + len(mesh.edges), dtype=bool)
+    edge_count = len(mesh.edges)
+    shared = np.zeros(row_count or count + edge_count, dtype=bool)
     movable = np.zeros(count, dtype=bool)
     if sharp is None:
         rows, pairs, none = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3))
@@ -82,7 +85,8 @@ def find_curves(points: Float[np.ndarray, "V 3"], mesh: Topology) -> Curves:
     if on_boundary.any():
         alone = sharp.weights[:, 2] == 0
         of_boundary = np.bincount(mesh.edges[on_boundary].reshape(-1), minlength=count)
-        shared[:count], shared[count:] = movable & alone & (of_boundary == TWO), on_boundary
+        shared[:count] = movable & alone & (of_boundary == TWO)
+        shared[count : count + edge_count] = on_boundary
     return Curves(
         movable,
         rows,

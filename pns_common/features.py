@@ -168,6 +168,21 @@ _RING = FeatureGroup(
     ),
 )
 
+# Of a face: none depends on the order of its corners. A face's z is one number, along its normal.
+_FACE = FeatureGroup(
+    "face",
+    (
+        Feature("mean jump", limit=2.0),
+        Feature("mean bend", turn_over=-1),
+        Feature("middle of the bends", turn_over=-1),
+        Feature("half the range of the bends"),
+        Feature("corners' umbrella height", turn_over=-1),
+        Feature("half the range of these heights"),
+        Feature("unevenness"),
+        Feature("shortest side over longest"),
+    ),
+)
+
 _UNSIGNED, _SIGNED = (HALF_TURN, MIRROR), (HALF_TURN, MIRROR, TURN_OVER)
 _TILTED = (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS)
 PAPER_5 = FeatureSet("paper-5", (_CURVATURE, _SHAPE), _UNSIGNED)
@@ -175,11 +190,17 @@ SIGNED_14 = FeatureSet("signed-14", _TILTED, _SIGNED)
 SIGNED_18 = FeatureSet("signed-18", (*_TILTED, _UMBRELLA), _SIGNED)
 RING_10 = FeatureSet("ring-10", (_RING,), (RING_TURN_OVER,))
 
-# Sets of edges, and sets of old vertices, by the name on a model card.
+FACE_8 = FeatureSet("face-8", (_FACE,), (RING_TURN_OVER,))
+
+# Sets of edges, old vertices and faces, by the name on a model card.
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
     {features.name: features for features in (PAPER_5, SIGNED_14, SIGNED_18)}
 )
 RING_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({RING_10.name: RING_10})
+FACE_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({FACE_8.name: FACE_8})
 FEATURE_COUNT: Mapping[str, int] = MappingProxyType(
-    {name: seen.count for name, seen in {**FEATURE_SETS, **RING_FEATURE_SETS}.items()}
+    {
+        name: seen.count
+        for name, seen in {**FEATURE_SETS, **RING_FEATURE_SETS, **FACE_FEATURE_SETS}.items()
+    }
 )

@@ -11,12 +11,10 @@ from jaxtyping import Bool, Float, Integer
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import Creases
 from pns_common.kernels import connectivity, measures
+from pns_common.kernels.frames import SHORTEST
 from pns_common.normals import NO_AREAS, measure_faces
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
-
-# Lengths of zero are read as this, so that every logarithm is finite.
-SHORTEST = 1e-150
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class RingMeasures:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A mesh of triangles before refinement; each measurement is made when it is first read.
+    """A mesh before refinement; each measurement is made when it is first read.
 
     Attributes:
         points: (V, 3) vertices.
@@ -98,7 +96,8 @@ class Level:
         """Lengths and turns of the edges."""
         mesh, count = self.topology, len(self.topology.edges)
         made = EdgeMeasures(np.empty(count), np.empty(count), np.empty(count))
-        read = self.points, self.normals, mesh.corners, mesh.edges, mesh.half_edges, mesh.edge_class
+        of_corners = mesh.corners, mesh.face_of_corner
+        read = self.points, self.normals, *of_corners, mesh.edges, mesh.half_edges, mesh.edge_class
         to = made.lengths, made.jumps, made.bends
         self.blocks.run(count, lambda begin, end: measures.measure_edges(*read, begin, end, *to))
         return made
@@ -121,6 +120,9 @@ class Level:
         if len(mesh.soft):
             jumps = jumps * (1 - mesh.soft)
         bends = np.empty(mesh.face_count)
+        if not mesh.triangles:
+            sums = np.add.reduceat(jumps[mesh.corner_edges], mesh.offsets[:-1])
+            return sums / np.diff(mesh.offsets)
 
         def take(begin: int, end: int) -> None:
             first, second, third = jumps[mesh.face_edges[begin:end]].T
@@ -136,7 +138,7 @@ class Level:
         fields, means = np.empty((count, measures.FIELDS)), np.empty((count, measures.MEANS))
         valence = np.empty(count, dtype=np.int32)
         spokes = self.points, mesh.edges, mesh.edge_reach
-        at_faces = mesh.faces, mesh.corner_reach, self.faces[1]
+        at_faces = mesh.corners, mesh.face_of_corner, mesh.corner_reach, self.faces[1]
         at_edges = self.edges.jumps, self.edges.bends, mesh.sharp_count
 
         def around(begin: int, end: int) -> None:

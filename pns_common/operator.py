@@ -11,14 +11,15 @@ The default's rule, models of format 4, acts at the control mesh alone:
 
     x0 = S p   the base scheme S applied to the control points p
     D  = S d   the prior: S applied to pushes d that undo the shrinking of S         ``pushes``
-    F          the edge's frame; at an old vertex three vectors of its ring
-    φ          features of the edge, or of the ring, and z(φ) the network's answer
-    h          the edge's length; at an old vertex the root mean square of its edges
+    F          the edge's frame; at an old vertex three vectors of its ring; at a face's vertex,
+               of which Catmull–Clark's scheme has one for each face, the face's normal alone
+    φ          features of the edge, of the ring or the face, and z(φ) the network's answer
+    h          the edge's length; elsewhere the root mean square of the ring's or face's edges
     γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
                x = 1 − n1 · n2, b the smaller mean of x over the edges of both faces;
-               tanh(c_v x_v) at old vertices, x_v the mean of x over its edges
+               tanh(c_v x_v) elsewhere, x_v the mean of x over the ring's or the face's edges
     Π_ρ        shortens to length ρ, whatever the network answers
-    s          the fold guard: no child triangle turns by more than θ                ``guard_scale``
+    s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
 C is the budget, R the mesh's unit of length, τ the share of h that the network may ask for. On a
 boundary or a crease there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it
@@ -39,7 +40,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
 from pns_common.errors import ModelError, ParameterError
-from pns_common.kernels import children, correction, frames, measures
+from pns_common.kernels import children, correction, frames, measures, quads
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
 
@@ -70,6 +71,7 @@ class Rule:
         network_scale: τ.
         fold_angle: θ in degrees, above 0 and below 90; read with a prior alone.
         feature_type: the floating type in which the networks read φ.
+        face_network: the network of face vertices, where the base scheme has some; None: z = 0.
         sharpness_network: ψ → sharpness in [0, 1], (N, 1) (sharpness.py); None: none is learned.
     """
 
@@ -85,12 +87,13 @@ class Rule:
     network_scale: float = 1.0
     fold_angle: float = 75.0
     feature_type: type[np.floating[Any]] = np.float64
+    face_network: Network | None = None
     sharpness_network: Network | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Additions:
-    """What a level adds: rows of old vertices first, then of edge vertices.
+    """What a level adds: rows of old vertices first, then of edge vertices and face vertices.
 
     Attributes:
         points: x.
@@ -117,7 +120,7 @@ class Additions:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """All that surrounds a network at N edges, or N old vertices.
+    """All that surrounds a network at N edges, N old vertices, or N faces.
 
     Attributes:
         rows: their numbers.
@@ -165,7 +168,8 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         x += made.displacement
         return Additions(x, base_points, *made.arrays, None, degenerate, None)
 
-    curves, vertices = find_curves(level.points, mesh), np.flatnonzero(level.ringed)
+    curves = find_curves(level.points, mesh, len(x))
+    vertices, faces = np.flatnonzero(level.ringed), np.arange(len(x) - count - len(mesh.edges))
     delta, along = prior(level, rule, curves)  # D, to become δ
     made = _Rows.starting_with(delta)
 
@@ -178,7 +182,12 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         made.correct(at, answers(rule.edge_network, at), first=count)
         return int(at.degenerate.sum())
 
+    def at_faces(begin: int, end: int) -> None:
+        at = face_inputs(level, rule, faces[begin:end])
+        made.correct(at, answers(rule.face_network, at, 1), first=count + len(mesh.edges))
+
     blocks.run(len(vertices), at_vertices)
+    blocks.run(len(faces), at_faces)
     degenerate: int = sum(blocks.run(len(edges), at_edges))
     made.add_on_curves(curves, along, budget_per_length(level, rule))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
@@ -202,22 +211,29 @@ def prior(
         rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness),
     )
     made = level.base.place(d + along, level.topology, level.blocks)
-    made[np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])] = 0.0
+    at_rest = np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])
+    made[: len(at_rest)][at_rest] = 0.0
     return made, curve_prior(curves, along)
 
 
 def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     """Return d: how far each vertex is pushed along its normal before S is applied.
 
-    d_v = −s w_k (u_v · m_v) m_v, u_v the mean of its neighbours less itself, m_v its unit normal,
-    w_k the weight of the neighbours in the limit mask of S: quasi-interpolation, by strength s. It
-    is 0 on planes and linear in scale, and 0 on curves, which have their own (curves.py).
+    d_v = s ((p − L p)_v · m_v) m_v, L the limit mask of S and m_v the unit normal:
+    quasi-interpolation, by strength s. For Loop p − L p = −w_k u_v, u_v the mean of the neighbours
+    less p, w_k their weight in L. It is 0 on planes and linear in scale, and 0 on curves, which
+    have their own (curves.py).
     """
     rings, made = level.rings, np.empty(level.points.shape)
-    assert level.base.limit is not None
-    assert level.base.limit.ring_weight is not None
-    weight = level.base.limit.ring_weight(np.arange(int(rings.valence.max(initial=0)) + 1))
-    read = rings.means, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
+    limit, smooth = level.base.limit, level.topology.without_creases()
+    assert limit is not None
+    valences = np.arange(int(rings.valence.max(initial=0)) + 1)
+    if limit.ring_weight is not None:
+        pull, weight = rings.means, limit.ring_weight(valences)
+    else:
+        pull, weight = limit.positions(level.points, smooth, level.blocks), np.ones(len(valences))
+        pull -= level.points
+    read = pull, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
     level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
     sharp = level.topology.sharpest
     if sharp is not None and len(level.topology.soft):
@@ -235,9 +251,13 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
     bends = level.face_bends if has_prior else level.logs[:0]
     measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
-    of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
     to = basis, curvature, sides, length, degenerate, features
-    frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
+    if mesh.triangles:
+        of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
+        frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
+    else:
+        of_mesh = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.edges, mesh.half_edges
+        frames.polygon_frames_and_features(*measured, *of_mesh, rows, 0, count, *to)
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.
@@ -274,6 +294,28 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
     )
 
 
+def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
+    """Return what surrounds the network at faces; z is the length along the normal."""
+    mesh, count, edges = level.topology, len(rows), level.edges
+    made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
+    of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
+    of_edges = edges.lengths, edges.jumps, edges.bends
+    frames.measure_face_vertices(
+        level.points, level.rings.fields, *of_faces, *of_edges, rows, 0, count, made
+    )
+    basis[:, :3], square = made[:, :3], made[:, frames.SQUARE]
+    return Inputs(
+        rows,
+        made[:, frames.FACE_FEATURES :].astype(rule.feature_type),
+        basis,
+        gate=np.tanh(rule.vertex_gate_sharpness * level.face_bends[rows]),
+        bound=budget_per_length(level, rule) * square,
+        reach=rule.network_scale * np.sqrt(square),
+        weight=np.ones(count),
+        degenerate=np.zeros(count, dtype=bool),
+    )
+
+
 def budget_per_length(level: Level, rule: Rule) -> float:
     """Return C / R."""
     if not level.reference_length:
@@ -281,8 +323,10 @@ def budget_per_length(level: Level, rule: Rule) -> float:
     return rule.budget / level.reference_length
 
 
-def answers(network: Network | None, at: Inputs) -> Float[np.ndarray, "N 3"]:
+def answers(network: Network | None, at: Inputs, columns: int = 3) -> Float[np.ndarray, "N 3"]:
     """Return the network's answers; 0 where the gate is shut, for which it is not run.
+
+    It gives so many columns; the others are 0.
 
     Raises:
         ModelError: an answer is not finite, or has another shape.
@@ -293,7 +337,8 @@ def answers(network: Network | None, at: Inputs) -> Float[np.ndarray, "N 3"]:
         return made
     every = is_open.all()
     asked = at.features if every else at.features[is_open]
-    made[slice(None) if every else is_open] = checked_answers(network, asked, columns=3)
+    rows = slice(None) if every else is_open
+    made[rows, :columns] = checked_answers(network, asked, columns)
     return made
 
 
@@ -326,14 +371,14 @@ def guard_scale(
     angle: float,
     curves: Curves,
 ) -> Float[np.ndarray, " W"]:
-    """Return s ∈ {1, ½, ¼, …, 0} of each new vertex, so that no child triangle folds.
+    """Return s ∈ {1, ½, ¼, …, 0} of each new vertex, so that no child folds.
 
-    While a child of x0 + s δ stands at more than ``angle`` (radians, below π/2) to its counterpart
-    in x0, or has less than a thousandth of its area, s of its corners is halved, for all such
-    children at once; after 30 rounds it becomes 0. The rounds know no order of faces, so the guard
-    does not depend on numbering, and a child is tested alone, so it is local. A vertex that a
-    boundary alone places is scaled only by children that it would fold by itself: what two meshes
-    share stays shared.
+    A child is a triangle, or the triangle at one of the four corners of a quad. While a child of
+    x0 + s δ stands at more than ``angle`` (radians, below π/2) to its counterpart in x0, or has
+    less than a thousandth of its area, s of its corners is halved, for all such children at once;
+    after 30 rounds it becomes 0. The rounds know no order of faces, so the guard does not depend on
+    numbering, and a child is tested alone, so it is local. A vertex that a boundary alone places is
+    scaled only by children that it would fold by itself: what two meshes share stays shared.
 
     It bounds the turns between neighbours too. With normals n, n' of two children and m, m' of
     their counterparts, ∠(n, n') ≤ ∠(n, m) + ∠(m, m') + ∠(m', n') ≤ ∠(m, m') + 2 ``angle``.
@@ -342,13 +387,22 @@ def guard_scale(
     scale, changed = np.ones(len(delta)), EVERYWHERE
     shared = curves.shared if curves.shared.any() else NONE_SHARED
     blocks = level.blocks.quiet()
+    mark = quads.mark_folds if level.base.polygons else children.mark_folds
+    of_mesh = (
+        mesh.corners,
+        mesh.offsets,
+        mesh.corner_edges,
+        mesh.vertex_count,
+        mesh.vertex_count + len(mesh.edges),
+    )
+    if not level.base.polygons:
+        of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
     for rounds in rounds_from_0():
         touched = np.zeros(len(delta), dtype=bool)
         read = base_points, delta, scale, shared, changed, math.cos(angle)
-        of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
         blocks.run(
             mesh.face_count,
-            lambda begin, end: children.mark_folds(*read, *of_mesh, begin, end, touched),  # noqa: B023
+            lambda begin, end: mark(*read, *of_mesh, begin, end, touched),  # noqa: B023
         )
         rows = np.flatnonzero(touched)
         if len(rows) == 0:

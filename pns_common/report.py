@@ -88,6 +88,7 @@ class LevelReport(Distances):
     gate: GateSummary
     normal_jump_max: float
     vertex_rule: NotRequired[VertexSummary]
+    face_rule: NotRequired[VertexSummary]
     shut: NotRequired[int]
     guarded: NotRequired[int]
 
@@ -215,8 +216,9 @@ def level_report(
     """Summarise the step that refined ``parent``; ``added`` is None for the base scheme."""
     count = parent.vertex_count
     none = np.zeros(0)
-    ratio = none if added is None else _of(added.ratio[count:], parent.interior)
-    gate = none if added is None else _of(added.gate[count:], parent.interior)
+    of_edges = slice(count, count + len(parent.edges))
+    ratio = none if added is None else _of(added.ratio[of_edges], parent.interior)
+    gate = none if added is None else _of(added.gate[of_edges], parent.interior)
     report: LevelReport = {
         "vertices": count + len(parent.edges) + (parent.face_count if quads else 0),
         "faces": len(parent.corners) if quads else 4 * parent.face_count,
@@ -237,6 +239,14 @@ def level_report(
                 "gate": _gate_summary(vertex_gate),
             }
             shut += _shut(vertex_gate)
+            if quads:
+                first = count + len(parent.edges)
+                report["face_rule"] = {
+                    "vertices": parent.face_count,
+                    "proximity_ratio": _ratio_summary(added.ratio[first:]),
+                    "gate": _gate_summary(added.gate[first:]),
+                }
+                shut += _shut(added.gate[first:])
         report["displacement_max"] = longest(added.displacement)
         report["envelope_max"] = float(added.bound.max(initial=0))
         report["shut"] = shut

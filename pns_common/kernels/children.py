@@ -38,7 +38,7 @@ def child_corners(faces, face_edges, vertex_count, f, i):
 
 
 @inlined
-def _moved(loop, displacement, scale, v):
+def moved(loop, displacement, scale, v):
     """Return where Loop puts vertex v, and where it is moved to."""
     p, s = row(loop, v), scale[v]
     return p, (
@@ -68,6 +68,24 @@ def _folds(p, q, r, cosine):
         return False
     size = math.sqrt(old_square) * math.sqrt(new_square)
     return not kept_area or not inner >= cosine * size
+
+
+@inlined
+def mark_fold(p, q, r, u, v, w, scale, shared, cosine, to):
+    """Mark the corners u, v, w of a child if it folds, where s is not 0 yet."""
+    if not _folds(p, q, r, cosine):
+        return
+    by_itself = True
+    if len(shared):
+        by_itself = _folds(
+            p if shared[u] else (p[0], p[0]),
+            q if shared[v] else (q[0], q[0]),
+            r if shared[w] else (r[0], r[0]),
+            cosine,
+        )
+    for corner in (u, v, w):
+        if scale[corner] > 0 and (by_itself or not shared[corner]):
+            to[corner] = True
 
 
 @kernel
@@ -100,21 +118,8 @@ def mark_folds(
             u, v, w = child_corners(faces, face_edges, vertex_count, f, i)
             if len(changed) and not (changed[u] or changed[v] or changed[w]):
                 continue
-            p, q = _moved(loop, displacement, scale, u), _moved(loop, displacement, scale, v)
-            r = _moved(loop, displacement, scale, w)
-            if not _folds(p, q, r, cosine):
-                continue
-            by_itself = True
-            if len(shared):
-                by_itself = _folds(
-                    p if shared[u] else (p[0], p[0]),
-                    q if shared[v] else (q[0], q[0]),
-                    r if shared[w] else (r[0], r[0]),
-                    cosine,
-                )
-            for corner in (u, v, w):
-                if scale[corner] > 0 and (by_itself or not shared[corner]):
-                    to[corner] = True
+            p, q = moved(loop, displacement, scale, u), moved(loop, displacement, scale, v)
+            mark_fold(p, q, moved(loop, displacement, scale, w), u, v, w, scale, shared, cosine, to)
 
 
 @kernel

@@ -176,12 +176,6 @@ def previous_corner(h):
 
 
 @inlined
-def face_of(h, face_of_corner):
-    """Return the face of a corner."""
-    return face_of_corner[h] if len(face_of_corner) else h // 3
-
-
-@inlined
 def face_corners(h, offsets, face_of_corner):
     """Return the first corner of a corner's face, and the first after them."""
     if len(face_of_corner) == 0:
@@ -189,6 +183,12 @@ def face_corners(h, offsets, face_of_corner):
         return first, first + 3
     f = face_of_corner[h]
     return offsets[f], offsets[f + 1]
+
+
+@inlined
+def face_of(h, face_of_corner):
+    """Return the face of a corner."""
+    return face_of_corner[h] if len(face_of_corner) else h // 3
 
 
 @inlined

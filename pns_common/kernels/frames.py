@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import math
+
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import next_corner, previous_corner
-from pns_common.kernels.measures import HEIGHT
-from pns_common.kernels.vectors import across, between, cross, divisor, dot, over, row
+from pns_common.kernels.measures import CLEAR_NORMAL, HEIGHT
+from pns_common.kernels.vectors import (
+    across,
+    between,
+    cross,
+    difference,
+    divisor,
+    dot,
+    norm,
+    over,
+    root,
+    row,
+)
 
 # Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε).
 ANTIPARALLEL = 1e-6
+# Lengths of zero are read as this, so that every logarithm is finite.
+SHORTEST = 1e-150
 # Feature columns: curvature; four logarithms of side ratios; then those with a sign.
 LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
 
@@ -100,16 +115,193 @@ def frames_and_features(
         features[to, LOGS + 2] = logs[ad] - logs[e]
         features[to, LOGS + 3] = logs[bd] - logs[e]
         if width > DIHEDRAL:
-            features[to, DIHEDRAL] = dot(cross(n, m), t)
-            at_a, at_b, at_c, at_d = row(fields, a), row(fields, b), row(fields, c), row(fields, d)
-            features[to, ENDS], features[to, ENDS + 1] = dot(at_a, t), dot(at_b, t)
-            features[to, ENDS + 2], features[to, ENDS + 3] = dot(at_a, side), dot(at_b, side)
-            features[to, WINGS], features[to, WINGS + 1] = dot(at_c, t), dot(at_d, t)
-            features[to, WINGS + 2], features[to, WINGS + 3] = dot(at_c, side), dot(at_d, side)
-        if width > UMBRELLAS:
-            features[to, UMBRELLAS], features[to, UMBRELLAS + 1] = (
-                fields[a, HEIGHT],
-                fields[b, HEIGHT],
+            at_a, at_b, at_c, at_d = (
+                four(fields, a),
+                four(fields, b),
+                four(fields, c),
+                four(fields, d),
             )
-            features[to, UMBRELLAS + 2] = fields[c, HEIGHT]
-            features[to, UMBRELLAS + 3] = fields[d, HEIGHT]
+            _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d)
+
+
+@inlined
+def four(values, i):
+    """Return the first four columns of a row."""
+    return values[i, 0], values[i, 1], values[i, 2], values[i, 3]
+
+
+@inlined
+def _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d):
+    """Write the features with a sign; ``at_a`` … ``at_d`` are mean normals and umbrella heights."""
+    features[to, DIHEDRAL] = dot(cross(n, m), t)
+    features[to, ENDS], features[to, ENDS + 1] = dot(at_a, t), dot(at_b, t)
+    features[to, ENDS + 2], features[to, ENDS + 3] = dot(at_a, side), dot(at_b, side)
+    features[to, WINGS], features[to, WINGS + 1] = dot(at_c, t), dot(at_d, t)
+    features[to, WINGS + 2], features[to, WINGS + 3] = dot(at_c, side), dot(at_d, side)
+    if width > UMBRELLAS:
+        features[to, UMBRELLAS], features[to, UMBRELLAS + 1] = at_a[HEIGHT], at_b[HEIGHT]
+        features[to, UMBRELLAS + 2], features[to, UMBRELLAS + 3] = at_c[HEIGHT], at_d[HEIGHT]
+
+
+@inlined
+def wing(values, h, corners, offsets, face_of_corner):
+    """Return the mean of the first four columns over a face's corners other than an edge's ends.
+
+    The edge leaves corner h. Of three columns the last one returned is 0.
+    """
+    f = face_of_corner[h]
+    first, stop = offsets[f], offsets[f + 1]
+    after, width = h + 1 if h + 1 < stop else first, values.shape[1]
+    x, y, z, w = 0.0, 0.0, 0.0, 0.0
+    for i in range(first, stop):
+        if i != h and i != after:
+            v = corners[i]
+            x += values[v, 0]
+            y += values[v, 1]
+            z += values[v, 2]
+            w += values[v, 3] if width > HEIGHT else 0.0
+    count = stop - first - 2
+    return x / count, y / count, z / count, w / count
+
+
+@inlined
+def _log_ratio(p, q, log):
+    """Return the logarithm of a distance, less ``log``."""
+    spoke = difference(p, q)
+    return math.log(max(root(dot(spoke, spoke)), SHORTEST)) - log
+
+
+@kernel
+def polygon_frames_and_features(
+    points,
+    normals,
+    fields,
+    lengths,
+    logs,
+    bends,
+    corners,
+    offsets,
+    face_of_corner,
+    edges,
+    half_edges,
+    rows,
+    begin,
+    end,
+    frames,
+    curvature,
+    sides,
+    length,
+    degenerate,
+    features,
+):
+    """Write what ``frames_and_features`` does with ``symmetric``, of edges between polygons.
+
+    In place of the opposite vertices c and d stand the means of the faces' other corners, where
+    fields are means too.
+    """
+    width = features.shape[1]
+    for i in range(begin, end):
+        e, to = rows[i], i - begin
+        a, b = edges[e, 0], edges[e, 1]
+        h1, h2 = half_edges[e, 0], half_edges[e, 1]
+        if corners[h1] != a:
+            h1, h2 = h2, h1
+        f, g = face_of_corner[h1], face_of_corner[h2]
+        n, m = row(normals, f), row(normals, g)
+        t, up, side, x, fallback = edge_frame(n, m, between(points, a, b))
+        if fallback:
+            x = 0.0
+        for k in range(3):
+            frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
+        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
+        if len(bends):
+            sides[to] = 0.0 if fallback else min(bends[f], bends[g])
+        c = wing(points, h1, corners, offsets, face_of_corner)
+        d = wing(points, h2, corners, offsets, face_of_corner)
+        p, q = row(points, a), row(points, b)
+        features[to, 0] = x
+        features[to, LOGS] = _log_ratio(c, p, logs[e])
+        features[to, LOGS + 1] = _log_ratio(c, q, logs[e])
+        features[to, LOGS + 2] = _log_ratio(d, p, logs[e])
+        features[to, LOGS + 3] = _log_ratio(d, q, logs[e])
+        if width > DIHEDRAL:
+            at_c = wing(fields, h1, corners, offsets, face_of_corner)
+            at_d = wing(fields, h2, corners, offsets, face_of_corner)
+            at_a, at_b = four(fields, a), four(fields, b)
+            _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d)
+
+
+# --- face vertices --------------------------------------------------------------------------------
+
+# Columns of a face's measures: its normal, h², and face-8.
+NORMAL, SQUARE, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 12
+
+
+@kernel
+def measure_face_vertices(
+    points,
+    fields,
+    corners,
+    offsets,
+    corner_edges,
+    lengths,
+    jumps,
+    bends,
+    rows,
+    begin,
+    end,
+    measures,
+):
+    """Write what the rule of face vertices reads, of faces rows[begin:end]; row 0 is the first.
+
+    The normal is the area vector over the sum of the areas of the triangles about the centroid,
+    scaled to length 1 where that is above CLEAR_NORMAL.
+
+    Args:
+        lengths, jumps, bends: (E,) of the edges: h, x, signed sine.
+        measures: (N, 12) out.
+    """
+    for i in range(begin, end):
+        f, to = rows[i], i - begin
+        first, stop = offsets[f], offsets[f + 1]
+        count = stop - first
+        centre = (0.0, 0.0, 0.0)
+        for h in range(first, stop):
+            p = row(points, corners[h])
+            centre = centre[0] + p[0] / count, centre[1] + p[1] / count, centre[2] + p[2] / count
+        mean, area = (0.0, 0.0, 0.0), 0.0
+        square, length, shortest, longest = 0.0, 0.0, math.inf, 0.0
+        jump, bend, least, most = 0.0, 0.0, math.inf, -math.inf
+        height, lowest, highest = 0.0, math.inf, -math.inf
+        for h in range(first, stop):
+            after = h + 1 if h + 1 < stop else first
+            u = difference(row(points, corners[h]), centre)
+            part = cross(u, difference(row(points, corners[after]), centre))
+            mean = mean[0] + part[0], mean[1] + part[1], mean[2] + part[2]
+            area += norm(part)
+            e, umbrella = corner_edges[h], fields[corners[h], HEIGHT]
+            square += lengths[e] * lengths[e] / count
+            length += lengths[e] / count
+            shortest, longest = min(shortest, lengths[e]), max(longest, lengths[e])
+            jump += jumps[e] / count
+            bend += bends[e] / count
+            least, most = min(least, bends[e]), max(most, bends[e])
+            height += umbrella / count
+            lowest, highest = min(lowest, umbrella), max(highest, umbrella)
+        divided = max(norm(mean), CLEAR_NORMAL * area)
+        normal = over(mean, divided) if divided > 0 else (0.0, 0.0, 0.0)
+        unevenness = 0.0
+        for h in range(first, stop):
+            over_plane = dot(difference(row(points, corners[h]), centre), normal)
+            unevenness += over_plane * over_plane / count
+        for k in range(3):
+            measures[to, NORMAL + k] = normal[k]
+        measures[to, SQUARE] = square
+        measures[to, FACE_FEATURES] = jump
+        measures[to, FACE_FEATURES + 1] = bend
+        measures[to, FACE_FEATURES + 2] = (most + least) / 2
+        measures[to, FACE_FEATURES + 3] = (most - least) / 2
+        measures[to, FACE_FEATURES + 4] = height
+        measures[to, FACE_FEATURES + 5] = (highest - lowest) / 2
+        measures[to, FACE_FEATURES + 6] = unevenness / square if square > 0 else 0.0
+        measures[to, FACE_FEATURES + 7] = shortest / longest if longest > 0 else 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import inlined, kernel
-from pns_common.kernels.connectivity import INTERIOR, face_of, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, face_of, skipped_block
 from pns_common.kernels.vectors import (
     NO_AREA,
     between,
@@ -79,7 +79,18 @@ def measure_polygons(points, corners, offsets, begin, end, normals, areas):
 
 @kernel
 def measure_edges(
-    points, normals, corners, edges, half_edges, edge_class, begin, end, lengths, jumps, bends
+    points,
+    normals,
+    corners,
+    face_of_corner,
+    edges,
+    half_edges,
+    edge_class,
+    begin,
+    end,
+    lengths,
+    jumps,
+    bends,
 ):
     """Write h, x = 1 − n1 · n2 and the signed sine of edges begin … end − 1.
 
@@ -95,7 +106,8 @@ def measure_edges(
         there, back = half_edges[e, 0], half_edges[e, 1]
         if corners[there] != edges[e, 0]:
             there, back = back, there
-        n, m = row(normals, there // 3), row(normals, back // 3)
+        n = row(normals, face_of(there, face_of_corner))
+        m = row(normals, face_of(back, face_of_corner))
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = difference(n, m)
             jumps[e] = dot(chord, chord) / 2
@@ -117,19 +129,24 @@ def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, co
 
 
 @kernel
-def mean_normals(faces, reach, areas, begin, end, fields):
-    """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4)."""
+def mean_normals(corners, face_of_corner, reach, areas, begin, end, fields):
+    """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4).
+
+    ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
+    """
     for v in range(max(begin, 0), end):
         for k in range(FIELDS):
             fields[v, k] = 0.0
     for block in range(reach.shape[0]):
-        first, count = skipped_block(faces, reach, block, begin, end)
-        for f in range(first, first + count):
-            for i in range(3):
-                v = faces[f, i]
-                if begin <= v < end:
-                    for k in range(FIELDS):
-                        fields[v, k] += areas[f, k]
+        if reach[block, 1] < begin or reach[block, 0] >= end:
+            continue
+        first = 3 * SKIPPED_ROWS * block
+        for h in range(first, min(first + 3 * SKIPPED_ROWS, corners.shape[0])):
+            v = corners[h]
+            if begin <= v < end:
+                f = face_of(h, face_of_corner)
+                for k in range(FIELDS):
+                    fields[v, k] += areas[f, k]
     for v in range(max(begin, 0), end):
         area = fields[v, AREA]
         for k in range(3):
@@ -245,12 +262,13 @@ def ring_basis(means, fields, rows, begin, end, basis):
 
 
 @kernel
-def normal_pushes(means, fields, valence, ringed, weight, strength, begin, end, pushes):
+def normal_pushes(pull, fields, valence, ringed, weight, strength, begin, end, pushes):
     """Write d_v = −s w_k (u · m̂) m̂ of vertices begin … end − 1: the prior of the operator.
 
     Args:
+        pull: (V, 3 or more) u: where w_k u leads is the limit.
         ringed: (V,) whether the prior acts at a vertex.
-        weight: w_k, the weight of the neighbours in Loop's limit mask, for each valence.
+        weight: w_k for each valence.
         strength: s.
     """
     for v in range(max(begin, 0), end):
@@ -258,6 +276,6 @@ def normal_pushes(means, fields, valence, ringed, weight, strength, begin, end, 
         agreement = norm(mean)
         clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
         normal = mean[0] / clear, mean[1] / clear, mean[2] / clear
-        inwards = weight[valence[v]] * dot(row(means, v), normal) if ringed[v] else 0.0
+        inwards = weight[valence[v]] * dot(row(pull, v), normal) if ringed[v] else 0.0
         for k in range(3):
             pushes[v, k] = strength * (-inwards * normal[k])

@@ -12,8 +12,10 @@ This holds where no face names a vertex twice.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pns_common.kernels import inlined, kernel
-from pns_common.kernels.children import squared_chord
+from pns_common.kernels.children import mark_fold, moved, squared_chord
 from pns_common.kernels.connectivity import INTERIOR, following_corner, opened_before
 from pns_common.kernels.vectors import NO_AREA, cross, difference, dot, norm, over, row
 
@@ -148,6 +150,44 @@ def quad_normal(p, q, r, s):
     if dot(vector, vector) > shortest * shortest:
         return over(vector, norm(vector))
     return 0.0, 0.0, 0.0
+
+
+@kernel
+def mark_folds(
+    base,
+    displacement,
+    scale,
+    shared,
+    changed,
+    cosine,
+    corners,
+    offsets,
+    corner_edges,
+    vertex_count,
+    face_vertex,
+    begin,
+    end,
+    to,
+):
+    """Mark corners of the quads of faces begin … end − 1 that fold at one of their four corners.
+
+    At each corner the triangle of it and its neighbours is tested, as ``children.mark_folds`` tests
+    triangles; arguments are as there.
+    """
+    for f in range(max(begin, 0), end):
+        first, stop = offsets[f], offsets[f + 1]
+        for h in range(first, stop):
+            # Of one type: the corners are looped over.
+            a, b, c = np.int64(corners[h]), vertex_count + corner_edges[h], face_vertex + f
+            d = vertex_count + corner_edges[h - 1 if h > first else stop - 1]
+            if len(changed) and not (changed[a] or changed[b] or changed[c] or changed[d]):
+                continue
+            p, q = moved(base, displacement, scale, a), moved(base, displacement, scale, b)
+            r, s = moved(base, displacement, scale, c), moved(base, displacement, scale, d)
+            mark_fold(s, p, q, d, a, b, scale, shared, cosine, to)
+            mark_fold(p, q, r, a, b, c, scale, shared, cosine, to)
+            mark_fold(q, r, s, b, c, d, scale, shared, cosine, to)
+            mark_fold(r, s, p, c, d, a, scale, shared, cosine, to)
 
 
 @kernel

@@ -20,6 +20,7 @@ PAPER_FORMAT, DEFAULT_FORMAT = 1, 4
 RETIRED_FORMATS = (2, 3)
 
 # How many columns each feature set has.
+FACE_FEATURES: Mapping[str, int] = MappingProxyType({"face-8": 8})
 EDGE_FEATURES: Mapping[str, int] = MappingProxyType({"paper-5": 5, "signed-18": 18})
 VERTEX_FEATURES: Mapping[str, int] = MappingProxyType({"ring-10": 10})
 SHARPNESS_FEATURES: Mapping[str, int] = MappingProxyType({"crease-53": 53})
@@ -50,6 +51,8 @@ class ModelCard:
         network_scale: τ, the longest vector that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard, between 0 and 90 degrees.
         sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
+        face_features: Name of the feature set that the face network reads, over Catmull–Clark; None
+            over Loop, which has no vertices in faces.
         sharpness_features: Name of the feature set that the sharpness network reads; None: there is
             none.
     """
@@ -69,6 +72,7 @@ class ModelCard:
     network_scale: float | None = None
     fold_angle: float | None = None
     sharpness_levels: int | None = None
+    face_features: str | None = None
     sharpness_features: str | None = None
 
     def to_json(self) -> str:
@@ -97,7 +101,7 @@ class ModelCard:
 
 
 FORMAT_4_FIELDS = tuple(field.name for field in fields(ModelCard) if field.default is None)
-OPTIONAL_FIELDS = frozenset({"sharpness_features"})
+OPTIONAL_FIELDS = frozenset({"face_features", "sharpness_features"})
 
 Range = tuple[Callable[[Any], bool], str]
 
@@ -119,6 +123,7 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
         "orientation": _one_of(ORIENTATIONS),
         "base": _one_of(BASES),
         "vertex_features": _one_of(VERTEX_FEATURES),
+        "face_features": _one_of(FACE_FEATURES),
         "vertex_gate_sharpness": _POSITIVE,
         "prior_strength": _STRENGTH,
         "boundary_strength": _STRENGTH,
@@ -199,3 +204,6 @@ def _check_fields_of_format(card: ModelCard) -> None:
             raise ValueError(f"unknown field {name} in format {card.format}")
         if not given and card.format == DEFAULT_FORMAT and name not in OPTIONAL_FIELDS:
             raise ValueError(f"missing field {name} in format {card.format}")
+    if (card.base == "catmull-clark") != (card.face_features is not None):
+        problem = "missing" if card.face_features is None else "unknown"
+        raise ValueError(f"{problem} field face_features over {card.base}")

@@ -3,9 +3,9 @@
 A file is one ONNX graph of at most ``LARGEST_FILE`` bytes: standard operators from an allow-list,
 no data outside it, the card under the metadata key ``pns_card``. Inputs are ``budget`` (a float32
 scalar) and ``features`` [edges, K], in format 4 also ``vertex_features`` [vertices, L] and, where
-the card names them, ``sharpness_features`` [edges, P]; outputs are ``correction`` [edges, 3],
-``vertex_correction`` [vertices, 3] and ``sharpness`` [edges, 1]. Hidden tensors of one call fill at
-most ``LARGEST_CALL`` bytes.
+the card names them, ``face_features`` [faces, M] and ``sharpness_features`` [edges, P]; outputs are
+``correction`` [edges, 3], ``vertex_correction`` [vertices, 3], ``face_correction`` [faces, 1] and
+``sharpness`` [edges, 1]. Hidden tensors of one call fill at most ``LARGEST_CALL`` bytes.
 
 The hashes of the bundled files stand in ``models/SHA256SUMS``: ``sha256sum -c`` reads it.
 """
@@ -15,10 +15,11 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from onnx import ModelProto, NodeProto, ValueInfoProto
 
 DEFAULT_MODEL = "general"
+# Of a bundled model over Loop, the one that takes over on meshes of polygons.
+COMPANIONS: Mapping[str, str] = MappingProxyType({"general": "general-quad"})
 BUNDLED = resources.files("pns_common") / "models"
 MANIFEST = "SHA256SUMS"
 
@@ -78,20 +81,24 @@ def load_model(
         return OnnxModel(source, _listed_hash(BUNDLED, source, data), data, providers)
     path = Path(source)
     if not path.is_file():
-        names = ", ".join(bundled_models()) or "none"
+        names = ", ".join(bundled_models(companions=True)) or "none"
         raise ModelError(str(source), expected=f"a file or a bundled name ({names})", found="none")
     _check_size(path.stat().st_size, str(path))
     return model_from_bytes(path.read_bytes(), path.stem, providers)
 
 
 def _is_bundled(source: str | os.PathLike[str]) -> TypeGuard[str]:
-    return isinstance(source, str) and source in bundled_models()
+    return isinstance(source, str) and source in bundled_models(companions=True)
 
 
-def bundled_models() -> list[str]:
-    """Return the names of the model files that come with the package."""
-    names = (entry.name for entry in BUNDLED.iterdir())
-    return sorted(name.removesuffix(".onnx") for name in names if name.endswith(".onnx"))
+def bundled_models(*, companions: bool = False) -> list[str]:
+    """Return the names of the model files that come with the package.
+
+    Companions, which other models bring for meshes of polygons, are named if they are asked for.
+    """
+    files = (entry.name for entry in BUNDLED.iterdir())
+    names = {name.removesuffix(".onnx") for name in files if name.endswith(".onnx")}
+    return sorted(names if companions else names - set(COMPANIONS.values()))
 
 
 def model_from_bytes(data: bytes, name: str, providers: Sequence[str] = CPU) -> OnnxModel:

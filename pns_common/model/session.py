@@ -19,6 +19,7 @@ from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import (
     CARD_KEY,
     EDGE_FEATURES,
+    FACE_FEATURES,
     SHARPNESS_FEATURES,
     VERTEX_FEATURES,
     ModelCard,
@@ -63,6 +64,14 @@ class Model(Protocol):
         ...
 
 
+class PolygonModel(Model, Protocol):
+    """A model over Catmull–Clark, whose third network places the vertices of faces."""
+
+    def face_correction(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        """Return lengths along the normals of faces, (N, 1), of at most the budget."""
+        ...
+
+
 @dataclass(frozen=True)
 class Network:
     """One network of a model file: the input that it reads, its columns, and its output's."""
@@ -79,6 +88,9 @@ def networks(card: ModelCard) -> tuple[Network, ...]:
     if card.vertex_features is not None:
         columns = VERTEX_FEATURES[card.vertex_features]
         held.append(Network("vertex_features", columns, "vertex_correction", 3))
+    if card.face_features is not None:
+        columns = FACE_FEATURES[card.face_features]
+        held.append(Network("face_features", columns, "face_correction", 1))
     if card.sharpness_features is not None:
         columns = SHARPNESS_FEATURES[card.sharpness_features]
         held.append(Network("sharpness_features", columns, "sharpness", 1))
@@ -151,6 +163,18 @@ class OnnxModel:
                 finite or of another shape.
         """
         return self._answers("vertex_features", features, budget)
+
+    def face_correction(
+        self, features: Float[np.ndarray, "N K"], budget: float
+    ) -> Float32[np.ndarray, "N 1"]:
+        """Return lengths along the normals of faces, in [−budget, budget].
+
+        Raises:
+            ParameterError: features of another shape.
+            ModelError: the model has no face network, the graph fails, or an answer is not finite
+                or of another shape.
+        """
+        return self._answers("face_features", features, budget)
 
     def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float32[np.ndarray, "N 1"]:
         """Return the sharpness of edges.

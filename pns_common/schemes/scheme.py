@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -17,7 +17,8 @@ from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
-from pns_common.model.session import Model
+from pns_common.model.file import COMPANIONS, load_model
+from pns_common.model.session import Model, PolygonModel
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
@@ -26,7 +27,7 @@ from pns_common.schemes.loop import LOOP
 
 PAPER_FORMAT, LEARNED_ONCE = 1, 4
 BASES = {base.name: base for base in (LOOP, CATMULL_CLARK)}
-NAMES = (LOOP.name, CATMULL_CLARK.name)
+NAMES = (LOOP.name, CATMULL_CLARK.name, "pns")
 
 
 @dataclass(frozen=True)
@@ -106,11 +107,13 @@ def catmull_clark() -> Scheme:
 
 
 def named_scheme(name: str) -> Scheme:
-    """Return a scheme by its name: a base scheme's.
+    """Return a scheme by its name: a base scheme's, or "pns", that of the default model.
 
     Raises:
         ParameterError: there is no such scheme.
     """
+    if name == "pns":
+        return pns(load_model())
     if name not in BASES:
         raise ParameterError("scheme", name, expected=f"one of {', '.join(NAMES)}")
     return Scheme(name, BASES[name])
@@ -131,6 +134,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("model", type(model), expected="a model, as load_model() gives it")
     card = model.card
+    companion = _companion(model, budget)
     budget = card.budget if budget is None else budget
     if not (is_number(budget) and budget >= 0):
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
@@ -146,8 +150,8 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     )
     if card.format == PAPER_FORMAT:
         return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
-    if card.base not in BASES or card.base != LOOP.name:
-        raise ModelError(model.name, expected=f"a base of {[LOOP.name]}", found=repr(card.base))
+    if card.base not in BASES:
+        raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
     learned = replace(
         rule,
         vertex_network=partial(_vertices_at_unit_budget, model),
@@ -157,6 +161,8 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         network_scale=_given(model, "network_scale"),
         fold_angle=_given(model, "fold_angle"),
     )
+    if card.face_features is not None:
+        learned = replace(learned, face_network=partial(_faces_at_unit_budget, model))
     creases, is_learned = NO_CREASES, card.sharpness_features is not None
     if is_learned:
         learned = replace(learned, sharpness_network=partial(_sharpness, model))
@@ -169,6 +175,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         learned,
         learned_levels=1,
         creases=creases,
+        for_polygons=companion,
         **named,  # type: ignore[arg-type]
     )
 
@@ -195,6 +202,22 @@ def _vertices_at_unit_budget(
     model: Model, features: Float[np.ndarray, "N K"]
 ) -> Float[np.ndarray, "N 3"]:
     return model.vertex_correction(features, 1.0)
+
+
+def _faces_at_unit_budget(
+    model: Model, features: Float[np.ndarray, "N K"]
+) -> Float[np.ndarray, "N 1"]:
+    return cast(PolygonModel, model).face_correction(features, 1.0)
+
+
+def _companion(model: Model, budget: float | None) -> Callable[[], Scheme] | None:
+    """Return what makes the scheme of a bundled model's companion for polygons, if it has one."""
+    name = COMPANIONS.get(model.name)
+    return None if name is None else partial(_bundled, name, budget)
+
+
+def _bundled(name: str, budget: float | None) -> Scheme:
+    return pns(load_model(name), budget)
 
 
 def _sharpness(model: Model, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, ModelError, Scheme, load_model, loop, pns, refine
+from pns_common import Mesh, MeshError, ModelError, Scheme, load_model, loop, pns, refine
 from pns_common.base_scheme import BaseScheme
 from pns_common.model.file import bundled_models
 from pns_common.topology import split_triangles
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.networks import Float64Model, default_model, random_layers
+from tests.support.polygons import mixed_cube
 
 
 def midpoints(values, topology, blocks):
@@ -82,15 +83,32 @@ def test_networks_are_asked_at_a_budget_of_one():
 
 def test_a_base_scheme_that_is_not_known_is_refused():
     model = Float64Model(random_layers(0))
-    model.card = replace(default_model().card, base="catmull-clark")
-    with pytest.raises(ModelError, match="catmull-clark"):
+    model.card = replace(default_model().card, base="butterfly")
+    with pytest.raises(ModelError, match="butterfly"):
         pns(model)
+
+
+def test_the_default_model_takes_polygons_by_its_companion():
+    """Triangles alone go to Loop and general; other faces to Catmull–Clark and general-quad."""
+    scheme = pns(load_model())
+    triangles = Mesh(*bumpy_sphere())
+    assert refine(triangles, scheme, 1).report["model"] == "general"
+    points, faces = mixed_cube()
+    mesh = Mesh(points, faces)
+    for given in (scheme, "pns"):
+        made = refine(mesh, given, 2)
+        assert made.report["model"] == "general-quad"
+        expected = refine(mesh, pns(load_model("general-quad")), 2).mesh.vertices
+        np.testing.assert_array_equal(made.mesh.vertices, expected)
+    assert refine(mesh, pns(load_model(), 0.5), 1).report["budget"] == 0.5
+    with pytest.raises(MeshError, match="catmull-clark"):
+        refine(mesh, pns(load_model("signed")), 1)
 
 
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
 def test_a_scheme_can_be_sent_to_another_process(again):
     mesh = Mesh(*grid(4, lambda x, y: x * y))
-    for scheme in (loop(), *(pns(load_model(name)) for name in bundled_models())):
+    for scheme in (loop(), *(pns(load_model(name)) for name in bundled_models(companions=True))):
         ours, theirs = (refine(mesh, each, 2) for each in (scheme, again(scheme)))
         np.testing.assert_array_equal(theirs.mesh.vertices, ours.mesh.vertices)
         assert theirs.report == ours.report

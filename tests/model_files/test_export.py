@@ -16,6 +16,7 @@ import export.run
 from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity, check_sharpness
+from export.prior_alone import write_prior_alone
 from pns_common import ModelError
 from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
@@ -242,3 +243,17 @@ def test_a_bundled_model_is_measured_anew_and_keeps_its_networks(tmp_path, monke
     refused = CliRunner().invoke(export.run.app, ["--measure", "nothing"])
     assert refused.exit_code == 1
     assert "expected a model file" in refused.output
+
+
+def test_the_prior_alone_answers_zero_and_says_that_it_is_untrained(tmp_path):
+    path = tmp_path / "prior.onnx"
+    digest = write_prior_alone(path)
+    model = load_model(path)
+    assert model.hash == digest == write_prior_alone(tmp_path / "again.onnx")
+    assert "untrained" in model.card.training["recipe"]
+    for answers, columns in (
+        (model, 18),
+        (model.vertex_correction, 10),
+        (model.face_correction, 8),
+    ):
+        assert not answers(np.ones((5, columns)), 3.0).any()

@@ -84,6 +84,22 @@ def two_perceptrons_bytes(edges, vertices, sharpness=None, *, card=DEFAULT_CARD)
     return model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
 
 
+def polygon_model(seed=0, scale=2.0, **changes):
+    """A model over Catmull–Clark with random weights; of scale 0, the prior alone."""
+    asked = {"features": 18, "vertex_features": 10, "face_features": 8}
+    nodes, weights, inputs, outputs = [], {}, [("budget", [])], []
+    for number, (given, width) in enumerate(asked.items()):
+        prefix, answers = given.removesuffix("features"), 1 if given == "face_features" else 3
+        layers = random_layers(seed + number, (width, 16, answers), scale)
+        more_nodes, more_weights = perceptron(layers, prefix=prefix)
+        nodes, weights = nodes + more_nodes, weights | more_weights
+        inputs.append((given, [f"{prefix}rows", width]))
+        outputs.append((f"{prefix}correction", [f"{prefix}rows", answers]))
+    card = replace(DEFAULT_CARD, base="catmull-clark", face_features="face-8", **changes)
+    data = model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
+    return model_from_bytes(data, "polygons")
+
+
 def perceptron(layers, *, project=True, prefix="", answer="correction"):
     """Nodes and weights from the input ``features`` to the output ``correction``, prefixed.
 
