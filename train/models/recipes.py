@@ -87,8 +87,8 @@ def signed(seed: int = 0) -> Recipe:
 def general(seed: int = 0) -> Recipe:
     """Return the default model's recipe: any mesh, at any scale, corrected once.
 
-    It starts from quasi-interpolation along the normal (s = 1), which a network of zeros leaves as it
-    is; in use s is 0.85, since vertices of simplified meshes lie outside a little already.
+    It starts from quasi-interpolation along the normal (s = 1), which a network of zeros leaves as
+    it is; in use s is 0.85, since vertices of simplified meshes lie outside a little already.
     C = 10 leaves room for all that is right on meshes as coarse as a cube; what must not happen
     there, the fold guard prevents. The gates open where faces are bent by two hundredths of a
     radian, so that fine meshes gain as well.
