@@ -87,18 +87,10 @@ def find_curves(
         of_boundary = np.bincount(mesh.edges[on_boundary].reshape(-1), minlength=count)
         shared[:count] = movable & alone & (of_boundary == TWO)
         shared[count : count + edge_count] = on_boundary
-    return Curves(
-        movable,
-        rows,
-        sides,
-        a,
-        b,
-        ends,
-        new_rows=np.concatenate([rows, count + edges]),
-        shares=np.concatenate([share[rows], mesh.sharpness[edges]]),
-        squares=np.concatenate([(_square(a) + _square(b)) / 2, _square(along)]),
-        shared=shared,
-    )
+    new_rows = np.concatenate([rows, count + edges])
+    shares = np.concatenate([share[rows], mesh.sharpness[edges]])
+    squares = np.concatenate([(_square(a) + _square(b)) / 2, _square(along)])
+    return Curves(movable, rows, sides, a, b, ends, new_rows, shares, squares, shared)
 
 
 def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 3"]:

@@ -98,12 +98,11 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
 
 
 def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
-    networks = trained.network, trained.vertex_network, trained.sharpness_network
-    scheme = pns(recipe_model(recipe, *networks), recipe.budget)
+    network, others = trained.network, (trained.vertex_network, trained.sharpness_network)
+    scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
     improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
     machine = machine_fingerprint()
-    network, *others = networks
     save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, *others))
     for name, rows in improvements.items():
         console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))

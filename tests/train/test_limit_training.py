@@ -19,9 +19,8 @@ from train.fitting import limit_trainer
 from train.fitting.learned_level import learned_level
 from train.fitting.limit_batch import limit_batch
 from train.fitting.limit_loss import limit_loss, measure
-from train.fitting.limit_maps import applied
 from train.fitting.limit_trainer import fit_to_limit, reference_of
-from train.fitting.sharp_masks import around_vertices, placed
+from train.fitting.sharp_masks import applied, around_vertices, placed
 from train.loop_masks import loop_mask
 from train.models.from_recipe import general_rule, initial_networks
 from train.models.recipes import general

@@ -16,7 +16,7 @@ from train.data.batch import joined_meshes
 from train.data.pairs.references import Pair
 from train.data.sharp_labels import coarse_sharp_edges
 from train.fitting.learned_level import LearnedLevel, learned_level
-from train.fitting.limit_maps import applied
+from train.fitting.sharp_masks import applied
 from train.loop_masks import limit_mask
 from train.models.recipe import Recipe
 

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from train.fitting.limit_batch import LimitBatch
-from train.fitting.limit_maps import applied
+from train.fitting.sharp_masks import applied
 from train.models.recipe import LimitWeights
 from train.tensors import dot, unit
 
