@@ -1,16 +1,23 @@
-"""A model without training: networks that answer 0, so that the prior acts alone."""
+"""A model for polygons without training of its own: the prior, and another model's sharpness.
 
+Its networks for corrections answer 0. How sharp an edge is, the sharpness network of a model of
+triangles says, whose features are defined for polygons alike.
+"""
+
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import onnx
-from onnx import TensorProto, helper, numpy_helper
+from onnx import GraphProto, TensorProto, helper, numpy_helper
+from onnx.utils import Extractor
 
 from export.onnx_graph import IR_VERSION, OPSET
+from pns_common.errors import ModelError
 from pns_common.files import replace_file
 from pns_common.model.card import CARD_KEY, DEFAULT_FORMAT, ModelCard
-from pns_common.model.file import model_from_bytes
-from pns_common.model.session import networks
+from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
+from pns_common.model.session import OnnxModel, networks
 
 # Full quasi-interpolation over Catmull–Clark; all else as on the default model's card.
 CARD = ModelCard(
@@ -19,7 +26,7 @@ CARD = ModelCard(
     gate_sharpness=1e7,
     budget=10.0,
     orientation="symmetric",
-    training={"recipe": "prior alone, untrained"},
+    training={"recipe": "prior alone, untrained; sharpness of another model"},
     metrics={},
     base="catmull-clark",
     vertex_features="ring-10",
@@ -30,18 +37,35 @@ CARD = ModelCard(
     fold_angle=75.0,
     sharpness_levels=2,
     face_features="face-8",
+    sharpness_features="crease-53",
 )
 
 
-def write_prior_alone(path: Path, card: ModelCard = CARD) -> str:
-    """Write a model file whose networks answer 0; return its hash.
+def write_prior_alone(path: Path, sharpness: Path | str = DEFAULT_MODEL) -> str:
+    """Write a model file whose corrections are 0; return its hash.
+
+    Args:
+        path: the file to write.
+        sharpness: the model, or its file, whose sharpness network is taken over.
 
     Raises:
-        ModelError: the file would break the model contract; nothing is written.
+        ModelError: the other model has no sharpness network, or the file would break the model
+            contract; nothing is written.
     """
+    other = load_model(sharpness)
+    if other.card.sharpness_features != CARD.sharpness_features:
+        expected = f"sharpness features {CARD.sharpness_features}"
+        raise ModelError(other.name, expected=expected, found=str(other.card.sharpness_features))
+    training = {**CARD.training, "sharpness": {"model": other.name, "sha256": other.hash}}
+    card = replace(CARD, training=training)
     inputs = [helper.make_tensor_value_info("budget", TensorProto.FLOAT, [])]
     nodes, weights, outputs = [], [], []
-    for network in networks(card):
+    taken = sharpness_graph(other)
+    inputs += taken.input
+    nodes += taken.node
+    weights += taken.initializer
+    outputs += taken.output
+    for network in networks(replace(card, sharpness_features=None)):
         name, rows = f"{network.given}_weights", f"{network.given}_rows"
         zeros = np.zeros((network.columns, network.answer_columns), dtype=np.float32)
         weights.append(numpy_helper.from_array(zeros, name))
@@ -64,3 +88,9 @@ def write_prior_alone(path: Path, card: ModelCard = CARD) -> str:
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, data)
     return digest
+
+
+def sharpness_graph(model: OnnxModel) -> GraphProto:
+    """Return the part of a model file that answers how sharp edges are."""
+    whole = onnx.load_from_string(model.data)
+    return Extractor(whole).extract_model(["sharpness_features"], ["sharpness"]).graph

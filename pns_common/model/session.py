@@ -104,7 +104,8 @@ class OnnxModel:
         name: Bundled name, or the file's name without its ending.
         card: What the file says of itself.
         hash: sha256 of the file's bytes.
-        size: The file's size in bytes.
+        data: The file's bytes.
+        size: How many these are.
         providers: Execution providers of onnxruntime that run it, preferred first.
         feature_type: In which type features are best given: they are not copied then.
     """
@@ -126,7 +127,7 @@ class OnnxModel:
             ModelError: onnxruntime cannot run the graph.
         """
         self.name, self.hash, self.size = name, digest, len(data)
-        self._data, self._wanted, self._of_thread = data, tuple(providers), threading.local()
+        self.data, self._wanted, self._of_thread = data, tuple(providers), threading.local()
         session = self._session()
         self.providers: tuple[str, ...] = tuple(session.get_providers())
         self.card = card or ModelCard.from_json(
@@ -139,7 +140,7 @@ class OnnxModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A session cannot travel to another process; the file's bytes can.
-        return OnnxModel, (self.name, self.hash, self._data, self._wanted, self.card)
+        return OnnxModel, (self.name, self.hash, self.data, self._wanted, self.card)
 
     def __call__(
         self, features: Float[np.ndarray, "N K"], budget: float
@@ -247,7 +248,7 @@ class OnnxModel:
         """Return the calling thread's session."""
         session = getattr(self._of_thread, "session", None)
         if session is None:
-            session = self._of_thread.session = _open_session(self._data, self.name, self._wanted)
+            session = self._of_thread.session = _open_session(self.data, self.name, self._wanted)
         return session
 
 

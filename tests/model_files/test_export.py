@@ -257,3 +257,5 @@ def test_the_prior_alone_answers_zero_and_says_that_it_is_untrained(tmp_path):
         (model.face_correction, 8),
     ):
         assert not answers(np.ones((5, columns)), 3.0).any()
+    asked = np.random.default_rng(0).standard_normal((50, 53))
+    np.testing.assert_array_equal(model.sharpness(asked), load_model().sharpness(asked))
