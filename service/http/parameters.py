@@ -95,10 +95,10 @@ class Parameters(BaseModel):
     crease: str = Field(
         default=DEFAULTS.crease,
         pattern=f"^({CREASE_PATTERN})$",
-        description="edges to keep sharp: `auto` (each as sharp as the model's sharpness network finds "
-        "it, at as many levels as the card says; none without such a network), `off`, `normals` "
-        "(edges whose two sides carry different normals) or `angle:` and degrees (edges whose faces "
-        "meet at more)",
+        description="edges to keep sharp: `auto` (each as sharp as the model's sharpness network "
+        "finds it, at as many levels as the card says; none without such a network), `off`, "
+        "`normals` (edges whose two sides carry different normals) or `angle:` and degrees (edges "
+        "whose faces meet at more)",
     )
     weld: WeldRule = Field(
         default=DEFAULTS.weld,
