@@ -1,7 +1,8 @@
 """`python -m benchmarks.ours NAME MESH LEVELS`: our refinement behind the peers' protocol.
 
-NAME is loop or the name of a bundled model; quads go to Catmull–Clark, and to its companion. The report is made when it is first read: NAME+report
-reads it, with all its diagnostics, in every run.
+NAME is loop or the name of a bundled model; quads go to Catmull–Clark and the model's companion.
+The report is made when it is first read: NAME+report reads it, with all its diagnostics, in every
+run.
 """
 
 from __future__ import annotations
