@@ -6,6 +6,7 @@ import { distances, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/promises";
 import type { Result } from "./result";
+import { NAMES } from "./settings";
 import type { Source } from "./tasks";
 import {
   showAdvice,
@@ -38,7 +39,7 @@ let validation = new AbortController();
 /** Facts of the file that is shown. */
 let facts: { source: Source; before: Before } | null = null;
 
-/** Show all that does not need Loop's side. */
+/** Show all that does not need the classic side. */
 export function describe(ours: Result, source: Source, scale: Scale): void {
   const milliseconds = performance.now() - ours.began;
   certify(ours, null, scale);
@@ -54,12 +55,12 @@ export function describe(ours: Result, source: Source, scale: Scale): void {
   void validateBoth(ours, source);
 }
 
-/** Show what is certain of the distance to Loop; returns it in a sentence. */
+/** Show what is certain of the distance to the classic rule; returns it in a sentence. */
 export function certify(ours: Result, loop: Result | null, scale: Scale): string {
   return showPromises(ours.report, lengths(ours, loop, scale));
 }
 
-function lengths({ model, report }: Result, loop: Result | null, { size, unit }: Scale): Lengths {
+function lengths({ model, report, classic }: Result, loop: Result | null, { size, unit }: Scale): Lengths {
   const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
   const measured = loop && distances(model, loop.model);
   return {
@@ -69,6 +70,7 @@ function lengths({ model, report }: Result, loop: Result | null, { size, unit }:
     rounding: rounding(model),
     size,
     unit,
+    rule: NAMES[classic],
   };
 }
 

@@ -39,7 +39,7 @@ const session = new Session({
     document.body.classList.remove("empty", "refined");
     document.body.classList.toggle("example", upload === example);
     element("advice").hidden = true;
-    form.fit(opened.faces);
+    form.fit(opened.split);
     fileList.show(upload);
     offerFormatOf(upload);
     stage.open(source);
@@ -58,12 +58,12 @@ const session = new Session({
   },
   stayed: (ours) => {
     changed.cancel();
-    form.show(ours.asked, session.source?.opened.faces ?? 0);
+    form.show(ours.asked, session.source?.opened.split ?? 0);
     remember();
   },
   renewed: (asked) => {
     changed.cancel();
-    form.show(asked, session.source?.opened.faces ?? 0);
+    form.show(asked, session.source?.opened.split ?? 0);
     remember();
   },
   stopped: ({ name }, again) => {
@@ -100,15 +100,15 @@ stage.view = given.view;
 const fileList = new FileList(takeOne);
 
 /** Return what is asked for a file that was just opened. */
-async function prepare(upload: Upload, { faces }: Opened, signal: AbortSignal): Promise<Asked> {
+async function prepare(upload: Upload, { split }: Opened, signal: AbortSignal): Promise<Asked> {
   // Which levels are open depends on the service's limits.
   await offered;
   signal.throwIfAborted();
   const before = form.asked;
-  form.fit(faces);
+  form.fit(split);
   const { refused, asked } = form;
   if (!refused) return asked;
-  form.show(before, session.source?.opened.faces ?? 0);
+  form.show(before, session.source?.opened.split ?? 0);
   throw fileProblem("The mesh is too large", `${upload.name} would have ${refused}.`);
 }
 

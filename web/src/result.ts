@@ -5,13 +5,15 @@ import { localProblem } from "./api/problem";
 import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
 import type { Upload } from "./files/upload";
 import type { Report } from "./report/report";
-import { query, type Asked } from "./settings";
+import { query, type Asked, type Classic } from "./settings";
 import { modelOf, type Model } from "./view/model";
 
 /** What is asked of the service. */
 export interface Order {
   upload: Upload;
   asked: Asked;
+  /** The classic rule for the file's faces; of a result for its own. */
+  classic: Classic;
   /** By the page's clock. */
   began: number;
 }
@@ -34,14 +36,20 @@ export async function resultOf(order: Order, answer: Answer): Promise<Result> {
   const report = json.asset?.extras?.pns as Report | undefined;
   if (!report) throw new Error("The answer has no report.");
   const { scene, animations } = await parseGltf(answer.bytes);
+  // A glTF goes in and comes out as triangles, even if it says how to join them.
+  const isFlat = !["glb", "gltf", "zip"].includes(order.upload.kind);
+  const polygons = isFlat && (json.extensionsUsed ?? []).includes("FB_ngon_encoding");
+  const model = modelOf(scene, animations);
+  for (const { userData } of model.meshes) userData.polygons = polygons;
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
     ...order,
-    key: query(order.asked.settings).toString(),
+    classic: polygons ? "catmull-clark" : "loop",
+    key: query(order.asked.settings, order.classic).toString(),
     bytes: answer.bytes,
     json,
     report,
-    model: modelOf(scene, animations),
+    model,
     timings,
     full: false,
   };

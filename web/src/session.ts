@@ -7,7 +7,7 @@ import { parseGltf } from "./files/gltf";
 import { Unreadable } from "./files/unreadable";
 import { bodyOf, type Upload } from "./files/upload";
 import { resultOf, shownIn, type Order, type Result } from "./result";
-import { asLoop, DEFAULTS, LOOP, query, type Asked, type Writing } from "./settings";
+import { asLoop, DEFAULTS, LOOP, query, type Asked, type Classic, type Writing } from "./settings";
 import { EMPTY, type Again, type Kind, type Listener, type Prepare, type Shown, type Source, type Task, type Work } from "./tasks";
 import { isFinite, modelOf, type Model } from "./view/model";
 
@@ -56,7 +56,7 @@ export class Session {
     await this.run({ kind: "opening", upload, again }, async (signal) => {
       const source = await this.open(upload, signal);
       try {
-        const order = { upload, asked: await prepare(upload, source.opened, signal), began };
+        const order = { upload, asked: await prepare(upload, source.opened, signal), classic: classicOf(source), began };
         this.end("refinement", "values");
         this.show(source, order);
         refined = this.refineShown(order);
@@ -70,7 +70,7 @@ export class Session {
 
   /** Refine the file that is shown with other settings. */
   async again(asked: Asked): Promise<void> {
-    if (this.source) await this.refineShown({ upload: this.source.upload, asked, began: performance.now() });
+    if (this.source) await this.refineShown({ upload: this.source.upload, asked, classic: classicOf(this.source), began: performance.now() });
   }
 
   /** Take a file that was never refined off the stage. */
@@ -88,7 +88,7 @@ export class Session {
   async fetch(ours: Result, writing: Writing, again: Again): Promise<ArrayBuffer | null> {
     let bytes: ArrayBuffer | null = null;
     await this.run({ kind: "download", upload: null, again }, async (signal) => {
-      ({ bytes } = await this.answer(ours, query(ours.asked.settings, writing), signal));
+      ({ bytes } = await this.answer(ours, query(ours.asked.settings, ours.classic, writing), signal));
     });
     return bytes;
   }
@@ -97,7 +97,7 @@ export class Session {
   async full(ours: Result, again: Again): Promise<Model | null> {
     let model: Model | null = null;
     await this.run({ kind: "values", upload: null, again }, async (signal) => {
-      const { bytes } = await this.answer(ours, query(ours.asked.settings, { diagnostics: "full" }), signal);
+      const { bytes } = await this.answer(ours, query(ours.asked.settings, ours.classic, { diagnostics: "full" }), signal);
       const { scene } = await shownIn("The heat map", () => parseGltf(bytes));
       model = modelOf(scene, []);
     });
@@ -115,7 +115,7 @@ export class Session {
       signal.throwIfAborted();
       if (error instanceof Unreadable) {
         const settings = { ...DEFAULTS, levels: 1, model: LOOP };
-        await this.answer({ upload, asked: { settings, wanted: settings }, began: 0 }, query(settings), signal);
+        await this.answer({ upload }, query(settings, "loop"), signal);
       }
       throw error;
     } finally {
@@ -151,32 +151,32 @@ export class Session {
   }
 
   private async complete(order: Order, signal: AbortSignal): Promise<void> {
-    const isThere = this.ours?.key === query(order.asked.settings).toString();
+    const isThere = this.ours?.key === query(order.asked.settings, order.classic).toString();
     const ours = isThere ? this.ours! : await this.refine(order, signal);
     // It is there already where Loop's side alone was cancelled.
     ours.asked = order.asked;
-    const loops = asLoop(order.asked);
+    const loops = { ...order, asked: asLoop(order.asked), classic: ours.classic };
     if (!isThere) {
       this.replace("ours", ours);
-      if (this.loop && this.loop.key !== query(loops.settings).toString()) this.replace("loop", null);
+      if (this.loop && this.loop.key !== query(loops.asked.settings, loops.classic).toString()) this.replace("loop", null);
       this.forget();
       this.listener.refined(ours);
     }
     if (order.asked.settings.model !== LOOP && !this.loop) {
-      this.replace("loop", await this.refine({ ...order, asked: loops }, signal, "for comparison"));
+      this.replace("loop", await this.refine(loops, signal, "for comparison"));
     }
     this.listener.compared(this.loop);
   }
 
   private async refine(order: Order, signal: AbortSignal, what = ""): Promise<Result> {
-    const answer = await this.answer(order, query(order.asked.settings), signal, what);
+    const answer = await this.answer(order, query(order.asked.settings, order.classic), signal, what);
     const result = await shownIn(what ? "The comparison" : "The result", () => resultOf(order, answer));
     if (signal.aborted) this.listener.discarded(result.model);
     signal.throwIfAborted();
     return result;
   }
 
-  private answer({ upload }: Order, asked: URLSearchParams, signal: AbortSignal, what = ""): Promise<Answer> {
+  private answer({ upload }: Pick<Order, "upload">, asked: URLSearchParams, signal: AbortSignal, what = ""): Promise<Answer> {
     return refine(bodyOf(upload), asked, signal, (progress) => this.listener.progress(progress, what));
   }
 
@@ -245,6 +245,10 @@ export class Session {
       if (this.underWay.delete(controller) && !this.underWay.size) this.listener.idle();
     }
   }
+}
+
+function classicOf({ opened }: Source): Classic {
+  return opened.polygons ? "catmull-clark" : "loop";
 }
 
 /** Whether an error is one of the file, which no other setting mends. */

@@ -2,7 +2,7 @@
 
 export interface Settings {
   levels: number;
-  /** A model's name; "" for the service's default; "loop" for the scheme without one. */
+  /** A model's name; "" for the service's default; "loop" for the classic rule. */
   model: string;
   /** C, dimensionless; null: the model's own. */
   budget: number | null;
@@ -22,7 +22,13 @@ export interface Asked {
   wanted: Settings;
 }
 
+/** The classic rule, whichever it is for a file. */
 export const LOOP = "loop";
+
+/** The classic rules: of triangles, and of polygons. */
+export type Classic = "loop" | "catmull-clark";
+
+export const NAMES: Record<Classic, string> = { loop: "Loop", "catmull-clark": "Catmull–Clark" };
 
 /** How near vertices have to be to be joined, in units of R: the length that the service's advice names. */
 const WELD = "0.001";
@@ -50,13 +56,13 @@ export interface Writing {
   format?: Format;
 }
 
-/** Return the parameters of a job. What is at the service's default is left out where it may be. */
-export function query(settings: Settings, writing: Writing = {}): URLSearchParams {
+/** Return the parameters of a job; `classic` is the file's classic rule. What is at the service's default is left out where it may be. */
+export function query(settings: Settings, classic: Classic, writing: Writing = {}): URLSearchParams {
   const loop = settings.model === LOOP;
   const { diagnostics = "summary", compress = "none", format = "glb" } = writing;
   const parameters = new URLSearchParams({
     levels: String(settings.levels),
-    scheme: loop ? "loop" : "pns",
+    scheme: loop ? classic : settings.model ? "pns" : "auto",
     diagnostics,
     uv: settings.uv,
     crease: settings.crease === "angle" ? `angle:${settings.angle}` : settings.crease,
@@ -71,7 +77,7 @@ export function query(settings: Settings, writing: Writing = {}): URLSearchParam
   return parameters;
 }
 
-/** Return the settings for Loop's rule alone: the other side of the comparison. */
+/** Return the settings for the classic rule alone: the other side of the comparison. */
 export function asLoop({ settings, wanted }: Asked): Asked {
   return { settings: { ...settings, model: LOOP, budget: null }, wanted };
 }

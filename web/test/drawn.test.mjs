@@ -8,7 +8,7 @@ import { describe, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { choose, columns, noBrowser, picture, settled } from "./support/browser.mjs";
 import { bare, moving, textured } from "./support/glb.mjs";
-import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
+import { example, number, part, PART_FACES, same, studio } from "./support/studio.mjs";
 
 const FOX = fileURLToPath(new URL("../../../shared/assets/Fox.glb", import.meta.url));
 const FIXTURES = fileURLToPath(new URL("../../../shared/assets/fixtures/", import.meta.url));
@@ -32,6 +32,24 @@ const AMISS = {
     nodes: [{ mesh: 0 }, { mesh: 1 }],
     meshes: [bare().meshes[0], bare().meshes[0]],
   }),
+};
+
+const HEADER = (format) =>
+  `ply\nformat ${format} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n` +
+  "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+const PLACES = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
+/** One square, first as two triangles. */
+const SQUARES = {
+  "cut.obj": `${PLACES.map((place) => `v ${place.join(" ")}`).join("\n")}\nf 1 2 3\nf 1 3 4\n`,
+  "square.obj": `${PLACES.map((place) => `v ${place.join(" ")}`).join("\n")}\nf 1 2 3 4\n`,
+  "square.off": `OFF\n4 1 0\n${PLACES.map((place) => place.join(" ")).join("\n")}\n4 0 1 2 3\n`,
+  "text.ply": `${HEADER("ascii")}${PLACES.map((place) => place.join(" ")).join("\n")}\n4 0 1 2 3\n`,
+  "binary.ply": Buffer.concat([
+    Buffer.from(HEADER("binary_little_endian")),
+    Buffer.from(new Float32Array(PLACES.flat()).buffer),
+    Buffer.from([4]),
+    Buffer.from(new Int32Array([0, 1, 2, 3]).buffer),
+  ]),
 };
 
 describe("what is drawn", { skip: noBrowser, timeout: 1_800_000 }, () => {
@@ -146,6 +164,23 @@ describe("what is drawn", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const { red, green } = coloursOf(await picture(page), 0);
     assert.ok(red > 0.3 && green > 0.3, `${red} red, ${green} green`);
     assert.ok(await page.isHidden("#notice"));
+  });
+
+  test("a polygon is drawn by its sides, whatever kind of file it comes in", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side&look=wire" });
+    const drawn = [];
+    for (const [name, content] of Object.entries(SQUARES)) {
+      await choose(page, { name, mimeType: "", buffer: Buffer.from(content) });
+      await page.locator("#file-name", { hasText: name }).waitFor();
+      await settled(page);
+      const shown = await picture(page);
+      drawn.push(columns(shown, 0, shown.width / 2));
+    }
+    const [cut, ...whole] = drawn;
+    for (const other of whole) same(other, whole[0]);
+    const inked = (pixels) => pixels.filter((value, at) => at % 4 === 0 && value < 200).length;
+    // A diagonal beside four sides.
+    assert.ok(inked(cut) > 1.15 * inked(whole[0]), `${inked(cut)} and ${inked(whole[0])} pixels`);
   });
 
   test("what readers of their own kind take amiss is drawn on both sides, and certified", async () => {

@@ -8,7 +8,7 @@ import { basename, dirname, join } from "node:path";
 import { describe, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { zipSync } from "three/addons/libs/fflate.module.js";
-import { choose, noBrowser, settled } from "./support/browser.mjs";
+import { choose, downloaded, noBrowser, settled } from "./support/browser.mjs";
 import { bare, broken, moving, read, write } from "./support/glb.mjs";
 import { example, number, part, PART_FACES, studio } from "./support/studio.mjs";
 
@@ -71,15 +71,21 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
-  test("an OBJ is converted, shown and told of", async () => {
+  test("an OBJ of polygons stays one, in its counts, its words and its download", async () => {
     const page = await visit({ hash: "#levels=1" });
     const text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1/1 2//1 3 4 # a square\nf -5 \\\n-4 5\n";
     await choose(page, { name: "a.obj", mimeType: "", buffer: Buffer.from(text) });
     await settled(page);
-    assert.match(await page.textContent("#label-left"), /\D3 faces/);
-    assert.match(await page.textContent("#label-right"), /· 12 faces/);
-    assert.match(await page.textContent("#changes"), /triangles added by cutting polygons/);
+    // A square and a triangle; a quad for each of their corners.
+    assert.match(await page.textContent("#label-left"), /\D2 faces/);
+    assert.match(await page.textContent("#label-right"), /· 7 faces/);
+    assert.match(await page.textContent("#levels option:checked"), /· 7 faces/);
+    assert.doesNotMatch(await page.textContent("#changes"), /polygons/);
     assert.equal(await page.textContent("#statistics tr:has-text('Vertices in the file') td"), "5");
+    assert.match(await page.textContent("#mathematics"), /Catmull–Clark’s.*Measured between the refined vertices/);
+    const { bytes } = await downloaded(page, "#download");
+    const corners = [...String(bytes).matchAll(/^f (.+)$/gm)].map(([, face]) => face.trim().split(/\s+/).length);
+    assert.deepEqual(corners, Array(7).fill(4));
   });
 
   test("a broken file gets words, and the model that was there stays", async () => {

@@ -86,12 +86,12 @@ describe("pictures", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
-  test("a cube that keeps its edges is coloured by its distance to Loop, whose cube has fewer vertices", async () => {
+  test("a cube that keeps its edges is coloured by its distance to the classic rule, whose cube has fewer vertices", async () => {
     const page = await visit({ hash: "#levels=1&look=distance" });
     await choose(page, CUBE);
     await settled(page);
     const pieces = await Promise.all(
-      ["pns", "loop"].map((scheme) => refined(`levels=1&normals=smooth&scheme=${scheme}`, CUBE.buffer, "model/obj")),
+      ["auto", "catmull-clark"].map((scheme) => refined(`levels=1&normals=smooth&scheme=${scheme}`, CUBE.buffer, "model/obj")),
     );
     // On each side a vertex has its octant, edge or face to itself.
     const [ours, loop] = pieces.map((bytes) => {

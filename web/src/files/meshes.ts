@@ -1,26 +1,21 @@
 /** OBJ, PLY, STL and OFF as geometry: positions, an OBJ's materials, and the colours of a PLY's vertices. */
 
 import { BufferAttribute, BufferGeometry } from "three";
-import { PLYLoader } from "three/addons/loaders/PLYLoader.js";
 import { STLLoader } from "three/addons/loaders/STLLoader.js";
 import { readObj } from "./obj";
+import { readPly } from "./ply";
+import { addFan } from "./polygons";
 
 export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   const geometry = READERS[kind]?.(bytes);
   if (!geometry?.getAttribute("position")?.count) throw new Error("it has no faces");
-  if (kind === "obj") return geometry;
-  // A PLY may have doubles, which no graphics card takes.
-  const { array } = geometry.getAttribute("position");
-  const read = new BufferGeometry()
-    .setAttribute("position", new BufferAttribute(Float32Array.from(array), 3))
-    .setIndex(geometry.index);
-  return geometry.hasAttribute("color") ? read.setAttribute("color", geometry.getAttribute("color")) : read;
+  return geometry;
 }
 
 const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {
   obj: (bytes) => readObj(text(bytes)),
-  ply: (bytes) => new PLYLoader().parse(bytes),
-  stl: (bytes) => new STLLoader().parse(bytes),
+  ply: readPly,
+  stl: (bytes) => new BufferGeometry().setAttribute("position", new STLLoader().parse(bytes).getAttribute("position")),
   off: (bytes) => readOff(text(bytes)),
 };
 
@@ -36,9 +31,7 @@ function readOff(source: string): BufferGeometry {
   const points = lines.slice(1, 1 + vertices).flatMap((line) => line.slice(0, 3));
   const index: number[] = [];
   for (const [corners = 0, ...polygon] of lines.slice(1 + vertices, 1 + vertices + faces)) {
-    for (let corner = 2; corner < corners; corner++) {
-      index.push(polygon[0]!, polygon[corner - 1]!, polygon[corner]!);
-    }
+    addFan(index, polygon.slice(0, corners));
   }
   if (points.length < 3 * vertices || !index.length || index.some((at) => !(at < vertices))) {
     throw new Error("its counts and its lines disagree");

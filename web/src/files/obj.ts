@@ -1,6 +1,7 @@
 /** OBJ: places, texture coordinates and faces by material, whatever objects, groups and lines they stand among. */
 
 import { BufferAttribute, BufferGeometry } from "three";
+import { addFan } from "./polygons";
 
 /** The materials that faces name, in the order of the geometry's groups, and the files that define them. */
 export interface ObjMaterials {
@@ -30,7 +31,7 @@ export function readObj(source: string): BufferGeometry {
       });
       const triangles = corners.get(material) ?? [];
       corners.set(material, triangles);
-      for (let i = 2; i < polygon.length; i++) triangles.push(polygon[0]!, polygon[i - 1]!, polygon[i]!);
+      addFan(triangles, polygon, ([vertex]) => vertex);
     }
   }
   const all = [...corners.values()].flat();

@@ -4,8 +4,10 @@ import { Group, Mesh, type AnimationClip, type BufferGeometry } from "three";
 import { part } from "../api/part";
 import { fileProblem } from "../api/problem";
 import { plain } from "../view/looks";
+import { corners } from "../measure/weld";
 import { jsonOf, parseGltf, triangles, type GltfJson } from "./gltf";
 import type { ObjMaterials } from "./obj";
+import { countPolygons } from "./polygons";
 import { unreadable } from "./unreadable";
 import type { Upload } from "./upload";
 
@@ -14,6 +16,10 @@ export interface Opened {
   clips: AnimationClip[];
   /** Faces that refinement starts from; an upper bound, since empty ones are dropped. */
   faces: number;
+  /** Faces after one step: four of a triangle, but one for each corner where other polygons are. */
+  split: number;
+  /** Whether it has faces of more corners than three. */
+  polygons: boolean;
   /** Files that it names and that did not come with it: textures, as it cannot be opened without others. */
   missing: string[];
   /** null where the file is no glTF. */
@@ -47,8 +53,12 @@ export async function open(upload: Upload): Promise<Opened> {
     mesh.material = await objMaterials(geometry.userData as ObjMaterials, upload.neighbours, missing);
   }
   const scene = new Group().add(mesh);
-  const corners = geometry.index?.count ?? geometry.getAttribute("position").count;
-  return { scene, clips: [], faces: Math.floor(corners / 3), missing: [...missing], json: null, gltf: null };
+  const triangles = Math.floor(corners(geometry).length / 3);
+  const faces = countPolygons(corners(geometry));
+  const polygons = faces < triangles;
+  mesh.userData.polygons = polygons;
+  const split = polygons ? triangles + 2 * faces : 4 * triangles;
+  return { scene, clips: [], faces, split, polygons, missing: [...missing], json: null, gltf: null };
 }
 
 async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Promise<Opened> {
@@ -60,10 +70,13 @@ async function openGltf(bytes: ArrayBuffer, neighbours: Map<string, Blob>): Prom
   }
   const missing = new Set<string>();
   const { scene, animations } = await parseGltf(bytes, neighbours, missing);
+  const faces = triangles(json);
   return {
     scene,
     clips: animations,
-    faces: triangles(json),
+    faces,
+    split: 4 * faces,
+    polygons: false,
     missing: [...missing],
     json,
     gltf: { bytes, neighbours },

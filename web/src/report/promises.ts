@@ -1,7 +1,7 @@
 /** Three promises that a report proves of a result, in plain words, and the mathematics behind them. */
 
 import { counted, length, lengthOf, percent, type Unit } from "./format";
-import { largestRatio, type Report } from "./report";
+import { isLearned, largestRatio, sharpEdges, type Report } from "./report";
 
 export interface Promised {
   holds: boolean;
@@ -13,17 +13,19 @@ export interface Promised {
 
 /** Lengths in the scene's units. */
 export interface Lengths {
-  /** The largest distance of the limit surface from Loop's, as the report proves it. */
+  /** The largest distance of the limit surface from the classic rule's, as the report proves it. */
   proved: number;
   /** The distance that the budget and the creases allow; null where the report has no such bound. */
   allowed: number | null;
-  /** The largest distance between a vertex and its counterpart by Loop; null until Loop's side is there. */
+  /** The largest distance between a vertex and its counterpart by the classic rule; null until that side is there. */
   measured: number | null;
   /** The possible error of `measured`. */
   rounding: number;
   /** The diagonal of the model's box. */
   size: number;
   unit: Unit;
+  /** The classic rule's name. */
+  rule: string;
 }
 
 export function promises(report: Report, lengths: Lengths): Promised[] {
@@ -31,45 +33,45 @@ export function promises(report: Report, lengths: Lengths): Promised[] {
     const text = "The file has no triangle mesh.";
     return [{ holds: false, title: "Nothing was refined", text, mathematics: "" }];
   }
-  const learned = report.scheme !== "loop";
+  const learned = isLearned(report);
   return [
     learned ? closeness(report, lengths) : classic(lengths),
-    folding(report),
-    ...(learned ? [flatness(report)] : []),
+    folding(report, lengths),
+    ...(learned ? [flatness(report, lengths)] : []),
   ];
 }
 
-function classic({ proved, size, unit }: Lengths): Promised {
-  const kept = proved ? ` Sharp edges keep it at most ${lengthOf(proved, size, unit)} from Loop’s smooth rule.` : "";
+function classic({ proved, size, unit, rule }: Lengths): Promised {
+  const kept = proved ? ` Sharp edges keep it at most ${lengthOf(proved, size, unit)} from ${rule}’s smooth rule.` : "";
   return {
     holds: true,
     title: "Classic",
-    text: `This is Loop’s classic rule: nothing learned took part.${kept}`,
-    mathematics: `Distance to Loop’s limit surface with the same creases: ${length(0, unit)}.`,
+    text: `This is ${rule}’s classic rule: nothing learned took part.${kept}`,
+    mathematics: `Distance to ${rule}’s limit surface with the same creases: ${length(0, unit)}.`,
   };
 }
 
 function closeness(report: Report, lengths: Lengths): Promised {
-  const { proved, allowed, measured, rounding, size, unit } = lengths;
+  const { proved, allowed, measured, rounding, size, unit, rule } = lengths;
   const used = Math.max(...report.levels.map(largestRatio));
   const most = proved * 1.001 + 1e-6 * size;
   const bound = allowed === null ? "" : ` The budget and the creases would allow ${length(allowed, unit)}.`;
   // Without this remark the two numbers would seem to disagree.
   const rounded = measured !== null && measured > most ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
   const apart = measured === null ? "" : ` Measured between the refined vertices: ${length(measured, unit)}${rounded}.`;
-  const sharp = report.levels.some(({ edges }) => edges.crease) ? ", kept sharp edges included" : "";
+  const sharp = report.levels.some(sharpEdges) ? ", kept sharp edges included" : "";
   return {
     holds: (measured === null || measured <= most + rounding) && used <= 1 + 1e-12,
     title: "Stays close",
     text: `No point is farther from the classic smooth surface than ${lengthOf(proved, size, unit)}${sharp}.`,
     mathematics:
-      `Every point of the limit surface is within ${length(proved, unit)} of Loop’s.${bound}${apart} ` +
-      "Each vertex may leave its place by Loop’s rule by C h² / R at most, whatever the model says; " +
+      `Every point of the limit surface is within ${length(proved, unit)} of ${rule}’s.${bound}${apart} ` +
+      `Each vertex may leave its place by ${rule}’s rule by C h² / R at most, whatever the model says; ` +
       `at most ${percent(Math.min(used, 1))} of that was used.`,
   };
 }
 
-function folding(report: Report): Promised {
+function folding(report: Report, { rule }: Lengths): Promised {
   const turned = report.levels.reduce((sum, level) => sum + level.flipped_faces, 0);
   const guarded = report.levels.reduce((sum, level) => sum + (level.guarded ?? 0), 0);
   const kept = guarded ? ` The guard shortened ${counted(guarded, "correction")} to keep it so.` : "";
@@ -80,19 +82,19 @@ function folding(report: Report): Promised {
       ? `${counted(turned, "face")} turned over: look at the wireframe there.`
       : "No face is turned over.",
     mathematics:
-      `${turned ? counted(turned, "face") : "No face"} at any level points away from its counterpart by Loop’s rule ` +
+      `${turned ? counted(turned, "face") : "No face"} at any level points away from its counterpart by ${rule}’s rule ` +
       `with the same creases.${kept}`,
   };
 }
 
-function flatness(report: Report): Promised {
+function flatness(report: Report, { rule }: Lengths): Promised {
   const active = Math.max(...report.levels.map((level) => level.gate.active));
   return {
     holds: true,
     title: "Flat stays flat",
     text: "Level areas stay level: the learned rule acts only where the surface bends.",
     mathematics:
-      "By construction: where neighbouring faces are coplanar the gate γ of each correction is 0, and the vertices are Loop’s; " +
+      `By construction: where neighbouring faces are coplanar the gate γ of each correction is 0, and the vertices are ${rule}’s; ` +
       "boundaries and creases may bend within their plane. " +
       `γ exceeded 0.01 on at most ${percent(active)} of the edges of a level.`,
   };

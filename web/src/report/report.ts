@@ -8,7 +8,7 @@ export interface Summary {
 export interface Level {
   vertices: number;
   faces: number;
-  edges: { interior: number; boundary: number; irregular: number; crease?: number };
+  edges: { interior: number; boundary: number; irregular: number; crease?: number; soft?: number };
   flipped_faces: number;
   proximity_ratio: Summary;
   gate: Summary & { active: number };
@@ -36,15 +36,25 @@ export interface MeshReport {
   /** Its place in the file's `meshes`. */
   index: number;
   learned_levels: number;
-  /** No point of the limit surface is farther from Loop's, in the mesh's own units. */
+  /** No point of the limit surface is farther from the classic rule's, in the mesh's own units. */
   limit_distance: number;
   /** What the budget would have allowed, with what creases keep back; null where it says nothing. */
   limit_distance_bound: number | null;
 }
 
-/** How many levels the learned rule acted at; those below are Loop's. */
+/** Whether a model took part. */
+export function isLearned({ model }: Report): boolean {
+  return model !== null;
+}
+
+/** Edges of a level that stay sharp, or more sharp than smooth. */
+export function sharpEdges({ edges }: Level): number {
+  return (edges.crease ?? 0) + (edges.soft ?? 0);
+}
+
+/** How many levels the learned rule acted at; those below are the classic rule's. */
 export function learnedLevels(report: Report): number {
-  if (report.scheme === "loop") return 0;
+  if (!isLearned(report)) return 0;
   return Math.max(0, ...report.meshes.map((mesh) => mesh.learned_levels ?? report.levels.length));
 }
 

@@ -2,6 +2,7 @@
 
 import { counted } from "../report/format";
 import type { Result } from "../result";
+import { NAMES } from "../settings";
 import type { Source } from "../tasks";
 import type { Layout } from "../view/viewer";
 import { element, make } from "./dom";
@@ -34,6 +35,6 @@ function labels(
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
   const after = ours && { title: "After", text };
   if (layout === "overlay" || layout === "single") return [null, after ?? before];
-  if (loop && ours) return [{ title: "Classic (Loop)", text: of(loop) }, { title: "Ours", text }];
+  if (loop && ours) return [{ title: `Classic (${NAMES[loop.classic]})`, text: of(loop) }, { title: "Ours", text }];
   return [before, after];
 }

@@ -7,7 +7,7 @@ const SENTENCES: Record<string, string> = {
   "general-quad": "As general, for meshes of four-sided faces.",
   signed: "The published method with better features, trained on ridges. For comparison.",
   paper: "The published method to the letter, trained on ridges. For comparison.",
-  [LOOP]: "The classic formula of 1987: nothing is learned. For cages drawn for it.",
+  [LOOP]: "The classic formula: nothing is learned. For cages drawn for it.",
 };
 
 export function describeModel(name: string): string {

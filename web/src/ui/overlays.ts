@@ -1,7 +1,6 @@
 /** Lines over the models, as the tools ask for them. */
 
-import type { Mesh } from "three";
-import { edgesOf, normalsOf } from "../view/lines";
+import { edgesOf, normalsOf, type Lines } from "../view/lines";
 import type { Look } from "../view/looks";
 import type { Model } from "../view/model";
 import { input } from "./dom";
@@ -15,10 +14,10 @@ export function drawLines(
   overlaid: Model | null,
   lookOf: (model: Model) => Look,
   size: number,
-): Mesh[] {
+): Lines[] {
   const style = getComputedStyle(document.body);
   const accent = style.getPropertyValue("--accent");
-  const lines: Mesh[] = [];
+  const lines: Lines[] = [];
   for (const model of models) {
     if (model === overlaid) {
       // Clear in front, faint behind.

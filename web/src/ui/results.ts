@@ -4,7 +4,7 @@ import type { Comparison } from "../validate/compare";
 import { angle, bytes, count, figure, seconds } from "../report/format";
 import type { Surface } from "../measure/surface";
 import { promises, type Lengths } from "../report/promises";
-import type { Report } from "../report/report";
+import { sharpEdges, type Report } from "../report/report";
 import { element, make } from "./dom";
 
 /** Show the promises; returns them in one sentence. */
@@ -73,7 +73,8 @@ export function showStatistics(
     ["File", bytes(before.bytes), bytes(size)],
   ];
   if (last) {
-    const after = last.edges.crease ? sharpest() : (last.normal_jump_max * 180) / Math.PI;
+    const sharp = sharpEdges(last);
+    const after = sharp ? sharpest() : (last.normal_jump_max * 180) / Math.PI;
     rows.push(
       ["Vertices of the surface", count(surface.vertices), count(last.vertices)],
       ["Boundary edges", count(surface.boundary), count(last.edges.boundary)],
@@ -81,7 +82,7 @@ export function showStatistics(
       ["Sharpest edge", angle(before.sharpest), angle(after)],
       ["Faces turned over", "–", count(report.levels.reduce((n, l) => n + l.flipped_faces, 0))],
     );
-    if (last.edges.crease) rows.push(["Crease edges", "–", count(last.edges.crease)]);
+    if (sharp) rows.push(["Sharp edges", "–", count(sharp)]);
   }
   fill("statistics", rows);
 }

@@ -13,7 +13,8 @@ export class SettingsForm {
   private wanted: Settings;
   /** The same, with the levels that the file and the service leave open. */
   private settings: Settings;
-  private faces = 0;
+  /** Faces after one step; 0 where there is no file. */
+  private split = 0;
 
   constructor(
     wanted: Settings,
@@ -52,19 +53,19 @@ export class SettingsForm {
 
   want(wanted: Settings): void {
     this.wanted = { ...wanted };
-    this.fit(this.faces);
+    this.fit(this.split);
   }
 
-  /** Close the levels that would make a file of so many faces too large; 0 where there is no file. */
-  fit(faces: number): void {
-    this.show({ settings: this.wanted, wanted: this.wanted }, faces);
+  /** Close the levels that would make a file too large, which has so many faces after one step. */
+  fit(split: number): void {
+    this.show({ settings: this.wanted, wanted: this.wanted }, split);
   }
 
-  /** Show what was asked for a file of so many faces. */
-  show(asked: Asked, faces: number): void {
+  /** Show what was asked for a file, which has so many faces after one step. */
+  show(asked: Asked, split: number): void {
     this.wanted = { ...asked.wanted };
     this.settings = { ...asked.settings };
-    this.faces = faces;
+    this.split = split;
     const deepest = this.levels().filter((level) => !this.refusal(level));
     this.settings.levels = Math.min(this.settings.levels, deepest.at(-1) ?? 1);
     this.write();
@@ -76,7 +77,7 @@ export class SettingsForm {
   }
 
   private predicted(level: number): number {
-    return this.faces * 4 ** level;
+    return this.split * 4 ** (level - 1);
   }
 
   /** Say why a level is closed; empty where it is open. */
@@ -101,7 +102,7 @@ export class SettingsForm {
     const { settings } = this;
     select("levels").replaceChildren(
       ...this.levels().map((level) => {
-        const faces = this.faces ? ` · ${count(this.predicted(level))} faces` : "";
+        const faces = this.split ? ` · ${count(this.predicted(level))} faces` : "";
         const isClosed = this.refusal(level) !== "";
         return option(String(level), isClosed ? `${level} · too many faces` : `${level}${faces}`, isClosed);
       }),
@@ -115,7 +116,7 @@ export class SettingsForm {
       option(model.default ? "" : model.name, model.name),
     );
     if (!bundled.length) bundled.push(option("", "default"));
-    select("model").replaceChildren(...bundled, option(LOOP, "classic (Loop)"));
+    select("model").replaceChildren(...bundled, option(LOOP, "classic"));
     select("model").value = settings.model;
     // Before the list is there, a link may name a model of it.
     const isUnknown = select("model").value !== settings.model && this.models.length > 0;

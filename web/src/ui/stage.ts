@@ -4,9 +4,9 @@ import { Box3, type Mesh } from "three";
 import type { Unit } from "../report/format";
 import type { Result } from "../result";
 import type { Source } from "../tasks";
-import { LOOP } from "../settings";
+import { isLearned } from "../report/report";
 import { colour, HEATS, needsFull, type Heat, type Legend } from "../view/heat";
-import { removeLines } from "../view/lines";
+import { removeLines, type Lines } from "../view/lines";
 import { dress, plain, type Look } from "../view/looks";
 import { dispose, extentOf, type Extent, type Model } from "../view/model";
 import { Playback } from "../view/playback";
@@ -34,7 +34,7 @@ export class Stage {
   private shown: Shown = { source: null, ours: null, loop: null };
   private surface: Look = "material";
   private heat: Heat | null = null;
-  private lines: Mesh[] = [];
+  private lines: Lines[] = [];
   private extent: Extent = { box: new Box3(), points: new Float32Array() };
   /** Where a link puts the camera, until there is a file to look at. */
   private awaited: string | null = null;
@@ -178,7 +178,7 @@ export class Stage {
   /** Put everything where the tools say. */
   arrange(): void {
     const { source, ours, loop } = this.shown;
-    const learned = ours && ours.report.scheme !== LOOP;
+    const learned = ours && isLearned(ours.report);
     // One side alone is compared with nothing; over the result stand the control mesh's edges.
     select("pair").disabled = !learned || this.layout === "overlay" || this.layout === "single";
     // Until Loop's side has come the control mesh stands in its place, under its own name.
@@ -224,7 +224,7 @@ export class Stage {
   private colourResult(): Legend | null {
     const { ours, loop } = this.shown;
     if (!this.heat || !ours) return null;
-    if (needsFull(this.heat) && !ours.full && ours.report.scheme !== LOOP) {
+    if (needsFull(this.heat) && !ours.full && isLearned(ours.report)) {
       this.wantFull();
       return null;
     }

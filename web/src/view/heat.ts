@@ -5,12 +5,11 @@ import type { Result } from "../result";
 import { dihedrals } from "../measure/dihedral";
 import { distances, type Field } from "../measure/distance";
 import { angle, figure, length, percent, type Unit } from "../report/format";
-import { learnedLevels } from "../report/report";
-import { LOOP } from "../settings";
+import { isLearned, learnedLevels } from "../report/report";
 import { heatRange } from "./looks";
 import type { Model } from "./model";
 
-const BY_LOOP = "This result is Loop’s: nothing learned took part.";
+const BY_LOOP = "This result is the classic rule’s: nothing learned took part.";
 
 export type Heat = "distance" | "ratio" | "gate" | "dihedral";
 
@@ -76,7 +75,7 @@ function clipped({ values, max }: Field): number {
 }
 
 function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
-  if (ours.report.scheme === LOOP && heat !== "dihedral") return zeros(ours.model);
+  if (!isLearned(ours.report) && heat !== "dihedral") return zeros(ours.model);
   switch (heat) {
     case "distance":
       return loop && distances(ours.model, loop.model);
@@ -87,7 +86,7 @@ function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
   }
 }
 
-/** Zeros: nothing is learned in Loop's own result. */
+/** Zeros: nothing is learned in the classic rule's own result. */
 function zeros(model: Model): Field {
   const values = model.meshes.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").count));
   return { values, max: 0 };
@@ -112,18 +111,18 @@ interface Description {
 }
 
 function describe(heat: Heat, { report }: Result, { size, unit }: Scale): Description {
-  const isLoop = report.scheme === LOOP && heat !== "dihedral";
+  const isClassic = !isLearned(report) && heat !== "dihedral";
   const last = learnedLevels(report) || report.levels.length;
   const carried = last < report.levels.length ? " Later vertices have the mean of their edge’s ends." : "";
   const described = DESCRIPTIONS[heat](last, carried, { size, unit });
-  return isLoop ? { ...described, note: BY_LOOP } : described;
+  return isClassic ? { ...described, note: BY_LOOP } : described;
 }
 
 const DESCRIPTIONS: Record<Heat, (level: number, carried: string, scale: Scale) => Description> = {
   distance: (_level, _carried, { size, unit }) => ({
     title: "Distance to classic",
     write: (value) => `${percent(value / size)} (${length(value, unit)})`,
-    note: "From Loop’s surface, in per cent of the model’s size.",
+    note: "From the classic surface, in per cent of the model’s size.",
   }),
   ratio: (level, carried) => ({
     title: "Share of its limit used",

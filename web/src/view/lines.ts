@@ -1,29 +1,39 @@
-/** Lines over a model: the edges of its triangles, and its normals. They follow skins and morphs. */
+/** Lines over a model: the edges of its faces, and its normals. They follow skins and morphs. */
 
 import {
   BufferAttribute,
   BufferGeometry,
+  LineBasicMaterial,
+  LineSegments,
+  type Material,
   MeshBasicMaterial,
   Mesh,
   SkinnedMesh,
   type InterleavedBufferAttribute,
 } from "three";
+import { outline } from "../files/polygons";
+import { corners } from "../measure/weld";
 import type { Model } from "./model";
+
+export type Lines = Mesh | LineSegments;
 
 type Attribute = BufferAttribute | InterleavedBufferAttribute;
 
-/** A second mesh over the same geometry, drawn as edges; `ghost` shows through the surface. */
-export function edgesOf(model: Model, colour: string, opacity = 1, ghost = false): Mesh[] {
-  const material = new MeshBasicMaterial({
+/** A second mesh over the same geometry, drawn as edges, or the sides of polygons; `ghost` shows through the surface. */
+export function edgesOf(model: Model, colour: string, opacity = 1, ghost = false): Lines[] {
+  const look = {
     color: colour,
-    wireframe: true,
     transparent: opacity < 1,
     opacity,
     depthTest: !ghost,
     depthWrite: false,
     toneMapped: false,
-  });
-  return model.meshes.map((mesh) => companion(mesh, mesh.geometry, material));
+  };
+  const wires = new MeshBasicMaterial({ ...look, wireframe: true });
+  const sides = new LineBasicMaterial(look);
+  return model.meshes.map((mesh) =>
+    mesh.userData.polygons ? sidesOf(mesh, sides) : companion(mesh, mesh.geometry, wires),
+  );
 }
 
 /** A short line along each normal; `length` in the scene's units. */
@@ -51,10 +61,10 @@ export function normalsOf(model: Model, colour: string, length: number): Mesh[] 
   return made;
 }
 
-export function removeLines(lines: Mesh[]): void {
+export function removeLines(lines: Lines[]): void {
   for (const line of lines) {
     line.removeFromParent();
-    (line.material as MeshBasicMaterial).dispose();
+    (line.material as Material).dispose();
     if (line.userData.ownsGeometry) line.geometry.dispose();
   }
 }
@@ -72,10 +82,26 @@ function companion(mesh: Mesh, geometry: BufferGeometry, material: MeshBasicMate
   // One array for both: whatever moves the mesh moves its lines.
   if (mesh.morphTargetInfluences) copy.morphTargetInfluences = mesh.morphTargetInfluences;
   copy.frustumCulled = mesh.frustumCulled;
-  copy.renderOrder = 1;
-  copy.userData.isLines = true;
-  mesh.add(copy);
-  return copy;
+  return over(mesh, copy);
+}
+
+/** The sides of polygons; a mesh that has them neither bends nor morphs. */
+function sidesOf(mesh: Mesh, material: LineBasicMaterial): LineSegments {
+  const { geometry } = mesh;
+  // A copy: with a geometry its attributes leave the graphics card.
+  const drawn = new BufferGeometry()
+    .setAttribute("position", geometry.getAttribute("position").clone())
+    .setIndex(new BufferAttribute(outline(corners(geometry)), 1));
+  const lines = new LineSegments(drawn, material);
+  lines.userData.ownsGeometry = true;
+  return over(mesh, lines);
+}
+
+function over<T extends Lines>(mesh: Mesh, lines: T): T {
+  lines.renderOrder = 1;
+  lines.userData.isLines = true;
+  mesh.add(lines);
+  return lines;
 }
 
 /** Each vertex twice, foot and tip, and a flat triangle between: drawn as edges it is one line. */
