@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: our refinement beside other libraries' Loop, in the same minutes.
+"""`python -m benchmarks`: our refinement beside other libraries' Loop and Catmull–Clark.
 
 python -m benchmarks                   # all cases; results.json and the plot beside this file
 python -m benchmarks --largest 80000   # small meshes only, nothing written
@@ -30,6 +30,7 @@ CASES = (
     *(Case(order, 320_000) for order in ORDERS),
     *(Case(order, 20_000, levels=3) for order in ("closed", "open", "shuffled")),
     *(Case(order, 1_300_000) for order in ("closed", "open", "shuffled")),
+    Case("quads", 300_000),
 )
 THIS = sys.executable
 # Not one word wider than needed in a file or a pipe.

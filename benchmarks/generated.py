@@ -26,6 +26,14 @@ def torus(faces: int) -> Mesh:
     return Mesh(points.reshape(-1, 3), np.stack(quads, axis=-2).reshape(-1, 3))
 
 
+def quads(faces: int) -> Mesh:
+    """Make the torus of quads that are not cut in two, of about so many faces."""
+    whole = torus(2 * faces)
+    # Triangles (a, b, c), (a, c, d) of each quad follow one another.
+    pairs = whole.faces.reshape(-1, 6)
+    return Mesh(whole.vertices, pairs[:, [0, 1, 2, 5]])
+
+
 def unrolled_torus(faces: int) -> MeshFile:
     """Make a torus with normals as exporters write it, cut open where its texture begins."""
     whole, (columns, rows) = torus(faces), _torus_size(faces)
@@ -113,4 +121,5 @@ ORDERS = {
     "shuffled": lambda faces: shuffled(torus(faces)),
     "a third bent": lambda faces: patch(faces, 1 / 3),
     "parts": parts,
+    "quads": quads,
 }

@@ -6,14 +6,20 @@ import sys
 import time
 from collections.abc import Callable
 
-from benchmarks.generated import torus
-from pns_common import load_model, loop, pns, refine
+from benchmarks.generated import quads, torus
+from pns_common import catmull_clark, load_model, loop, pns, refine
 
 
 def plain_loop() -> Callable[[], object]:
     """Refine 320,000 faces by one level of Loop."""
     mesh = torus(320_000)
     return lambda: refine(mesh, loop(), 1)
+
+
+def plain_quads() -> Callable[[], object]:
+    """Refine 300,000 quads by one level of Catmull–Clark."""
+    mesh = quads(300_000)
+    return lambda: refine(mesh, catmull_clark(), 1)
 
 
 def learned_level() -> Callable[[], object]:
@@ -41,7 +47,9 @@ def file() -> Callable[[], object]:
     return lambda: subdivide_gltf(data, "glb", Options(2), model, limits)
 
 
-WORKLOADS = {work.__name__: work for work in (plain_loop, learned_level, three_levels, file)}
+WORKLOADS = {
+    work.__name__: work for work in (plain_loop, plain_quads, learned_level, three_levels, file)
+}
 
 
 def repeat(work: Callable[[], object], seconds: float) -> None:

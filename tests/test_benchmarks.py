@@ -19,7 +19,7 @@ from service.meshfiles.mesh_file import NORMAL, UV
 @pytest.mark.parametrize("order", ORDERS)
 def test_generated_meshes_are_manifold_and_about_as_large_as_asked(order):
     mesh = ORDERS[order](4000)
-    classes = np.bincount(build_topology(mesh.faces, len(mesh.vertices)).edge_class, minlength=4)
+    classes = np.bincount(mesh.topology().edge_class, minlength=4)
     assert abs(len(mesh.faces) - 4000) < 200
     assert classes[EdgeClass.IRREGULAR] == 0
     assert (classes[EdgeClass.BOUNDARY] > 0) == (order in ("open", "a third bent"))
@@ -46,8 +46,9 @@ def test_an_unrolled_torus_is_the_torus_cut_open():
     assert np.ptp(uv[cut.faces], axis=1).max() < 0.2
 
 
-def test_a_mesh_file_holds_what_was_written(tmp_path):
-    mesh = ORDERS["open"](50)
+@pytest.mark.parametrize("order", ["open", "quads"])
+def test_a_mesh_file_holds_what_was_written(tmp_path, order):
+    mesh = ORDERS[order](50)
     write_mesh(tmp_path / "mesh", mesh.vertices, mesh.faces)
     points, faces = read_mesh(str(tmp_path / "mesh"))
     assert np.array_equal(points, mesh.vertices)
@@ -55,8 +56,9 @@ def test_a_mesh_file_holds_what_was_written(tmp_path):
     assert (points.dtype, faces.dtype) == (np.float64, np.int32)
 
 
-def test_ours_answers_each_run_with_what_it_made(tmp_path):
-    mesh = ORDERS["closed"](200)
+@pytest.mark.parametrize("order", ["closed", "quads"])
+def test_ours_answers_each_run_with_what_it_made(tmp_path, order):
+    mesh = ORDERS[order](200)
     write_mesh(tmp_path / "mesh", mesh.vertices, mesh.faces)
     command = [*ours("loop", sys.executable), str(tmp_path / "mesh"), "2"]
     done = subprocess.run(

@@ -1,6 +1,6 @@
 // What every C++ peer shares: a mesh file in, one line of JSON for each run that is asked for.
 //
-// The file: int64 counts V and F, then V × 3 float64 and F × 3 int32. "run" on standard input makes
+// The file: int64 counts V and F, then V × 3 float64 and F × 3 or F × 4 int32. "run" on standard input makes
 // one run from arrays to arrays, connectivity included, and prints its wall and processor seconds,
 // the peak memory above what stood before, and what came out.
 #pragma once
@@ -19,8 +19,9 @@
 struct Arrays {
     std::vector<double> points;
     std::vector<int32_t> faces;
+    int degree = 3;
     std::size_t vertex_count() const { return points.size() / 3; }
-    std::size_t face_count() const { return faces.size() / 3; }
+    std::size_t face_count() const { return faces.size() / degree; }
 };
 
 inline Arrays read_mesh(const char* path) {
@@ -29,7 +30,11 @@ inline Arrays read_mesh(const char* path) {
     file.read(reinterpret_cast<char*>(counts), sizeof counts);
     Arrays mesh;
     mesh.points.resize(3 * counts[0]);
-    mesh.faces.resize(3 * counts[1]);
+    file.seekg(0, std::ios::end);
+    const int64_t start = sizeof counts + 3 * counts[0] * sizeof(double);
+    mesh.degree = int((int64_t(file.tellg()) - start) / int64_t(counts[1] * sizeof(int32_t)));
+    file.seekg(sizeof counts);
+    mesh.faces.resize(mesh.degree * counts[1]);
     file.read(reinterpret_cast<char*>(mesh.points.data()), mesh.points.size() * sizeof(double));
     file.read(reinterpret_cast<char*>(mesh.faces.data()), mesh.faces.size() * sizeof(int32_t));
     if (!file) {
@@ -47,13 +52,14 @@ inline long status_kib(const char* name) {
 }
 
 template <class Subdivide>
-int serve(int count, char** arguments, Subdivide subdivide) {
+int serve(int count, char** arguments, Subdivide subdivide, bool takes_quads = false) {
     if (count != 3) {
         std::fprintf(stderr, "usage: %s MESH LEVELS\n", arguments[0]);
         return 2;
     }
     const Arrays mesh = read_mesh(arguments[1]);
     const int levels = std::atoi(arguments[2]);
+    if (mesh.degree != 3 && !takes_quads) return 3;
     for (std::string command; std::getline(std::cin, command) && command == "run";) {
         std::ofstream("/proc/self/clear_refs") << "5";
         const long before = status_kib("VmRSS:");

@@ -1,4 +1,4 @@
-// OpenSubdiv's uniform Loop: Far::TopologyRefiner and PrimvarRefiner.
+// OpenSubdiv's uniform Loop of triangles, Catmull-Clark of quads: Far::TopologyRefiner and PrimvarRefiner.
 #include <opensubdiv/far/primvarRefiner.h>
 #include <opensubdiv/far/topologyDescriptor.h>
 
@@ -20,7 +20,7 @@ struct Point {
 Arrays subdivide(const Arrays& in, int levels) {
     using Descriptor = Far::TopologyDescriptor;
     using Factory = Far::TopologyRefinerFactory<Descriptor>;
-    const std::vector<int> sizes(in.face_count(), 3);
+    const std::vector<int> sizes(in.face_count(), in.degree);
     Descriptor descriptor;
     descriptor.numVertices = int(in.vertex_count());
     descriptor.numFaces = int(in.face_count());
@@ -28,8 +28,9 @@ Arrays subdivide(const Arrays& in, int levels) {
     descriptor.vertIndicesPerFace = in.faces.data();
     Sdc::Options options;
     options.SetVtxBoundaryInterpolation(Sdc::Options::VTX_BOUNDARY_EDGE_ONLY);
+    const auto scheme = in.degree == 3 ? Sdc::SCHEME_LOOP : Sdc::SCHEME_CATMARK;
     const std::unique_ptr<Far::TopologyRefiner> refiner(
-        Factory::Create(descriptor, Factory::Options(Sdc::SCHEME_LOOP, options)));
+        Factory::Create(descriptor, Factory::Options(scheme, options)));
     Far::TopologyRefiner::UniformOptions uniform(levels);
     uniform.fullTopologyInLastLevel = false;
     refiner->RefineUniform(uniform);
@@ -44,14 +45,15 @@ Arrays subdivide(const Arrays& in, int levels) {
     }
     const Far::TopologyLevel last = refiner->GetLevel(levels);
     Arrays out;
+    out.degree = in.degree;
     out.points.resize(3 * points.size());
     std::memcpy(out.points.data(), points.data(), out.points.size() * sizeof(double));
-    out.faces.reserve(3 * std::size_t(last.GetNumFaces()));
+    out.faces.reserve(in.degree * std::size_t(last.GetNumFaces()));
     for (int f = 0; f < last.GetNumFaces(); ++f) {
         const Far::ConstIndexArray corners = last.GetFaceVertices(f);
-        for (int i = 0; i < 3; ++i) out.faces.push_back(corners[i]);
+        for (int i = 0; i < in.degree; ++i) out.faces.push_back(corners[i]);
     }
     return out;
 }
 
-int main(int count, char** arguments) { return serve(count, arguments, subdivide); }
+int main(int count, char** arguments) { return serve(count, arguments, subdivide, true); }

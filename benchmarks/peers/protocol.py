@@ -15,7 +15,7 @@ import numpy as np
 
 
 def write_mesh(path: Path, points: np.ndarray, faces: np.ndarray) -> None:
-    """Write a mesh as every peer reads it: counts, float64 coordinates, int32 faces."""
+    """Write a mesh as every peer reads it: counts, float64 points, int32 faces of one degree."""
     with path.open("wb") as file:
         np.array([len(points), len(faces)], dtype=np.int64).tofile(file)
         np.ascontiguousarray(points, dtype=np.float64).tofile(file)
@@ -23,11 +23,11 @@ def write_mesh(path: Path, points: np.ndarray, faces: np.ndarray) -> None:
 
 
 def read_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Read points (V, 3) float64 and faces (F, 3) int32."""
+    """Read points (V, 3) float64 and faces (F, 3) or (F, 4) int32."""
     with Path(path).open("rb") as file:
         vertices, faces = np.fromfile(file, dtype=np.int64, count=2)
         points = np.fromfile(file, dtype=np.float64, count=3 * vertices)
-        return points.reshape(-1, 3), np.fromfile(file, dtype=np.int32).reshape(-1, 3)[:faces]
+        return points.reshape(-1, 3), np.fromfile(file, dtype=np.int32).reshape(faces, -1)
 
 
 def status_kib(name: str) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from protocol import read_mesh, serve
 
+TRIANGLE = 3
 Arrays = tuple[np.ndarray, np.ndarray]
 
 
@@ -57,4 +58,7 @@ PEERS = {peer.__name__: peer for peer in (libigl, trimesh, pyvista, open3d)}
 
 if __name__ == "__main__":
     name, path, depth = sys.argv[1:]
-    serve(PEERS[name](*read_mesh(path), int(depth)))
+    mesh = read_mesh(path)
+    if mesh[1].shape[1] != TRIANGLE:
+        sys.exit("Loop refines triangles")
+    serve(PEERS[name](*mesh, int(depth)))

@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, catmull_clark, pns, refine
 from pns_common.columns import level_topologies
-from pns_common.features import FACE_8, RING_10, SIGNED_18
 from pns_common.limit import limit_positions
 from pns_common.operator import edge_inputs, face_inputs, pushes, vertex_inputs
 from pns_common.refinement import control_level
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.topology import EdgeClass
 from tests.support.meshes import bent, manifolds, rotation
-from tests.support.networks import DEFAULT_CARD, float64_network, polygon_model, random_layers
+from tests.support.networks import DEFAULT_CARD, TiedPolygonModel, polygon_model
 from tests.support.polygons import (
     CUBE_FACES,
     SHAPES,
@@ -33,39 +32,7 @@ ROUNDING = 1 + 1e-12
 CARD = polygon_model().card
 
 
-class TiedModel:
-    """Networks in double precision with the symmetries of their features, by averaging."""
-
-    name, hash, card = "tied", "0" * 64, CARD
-
-    def __init__(self, seed):
-        self.networks = {
-            seen.name: (float64_network(random_layers(seed, (seen.count, 16, 3))), seen.symmetries)
-            for seen in (SIGNED_18, RING_10, FACE_8)
-        }
-
-    def _answers(self, name, features, budget):
-        network, group = self.networks[name]
-        turned = [
-            local * network(signs * features[:, order])
-            for order, signs, local in zip(group.order, group.signs, group.local, strict=True)
-        ]
-        return budget * np.mean(turned, axis=0)
-
-    def __call__(self, features, budget):
-        return self._answers("signed-18", features, budget)
-
-    def vertex_correction(self, features, budget):
-        return self._answers("ring-10", features, budget)
-
-    def sharpness(self, features):
-        raise AssertionError("the card names no sharpness network")
-
-    def face_correction(self, features, budget):
-        return self._answers("face-8", features, budget)[:, :1]
-
-
-TIED = TiedModel(3)
+TIED = TiedPolygonModel(3)
 refined_once = partial(refine, levels=1, creases=None)
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
+from pns_common.features import FACE_8, RING_10, SIGNED_18
 from pns_common.model.card import (
     CARD_KEY,
     EDGE_FEATURES,
@@ -30,6 +31,9 @@ DEFAULT_CARD = ModelCard(
     fold_angle=75.0,
     sharpness_levels=2,
 )
+
+
+POLYGON_CARD = replace(DEFAULT_CARD, base="catmull-clark", face_features="face-8")
 
 
 def model_bytes(
@@ -95,7 +99,7 @@ def polygon_model(seed=0, scale=2.0, **changes):
         nodes, weights = nodes + more_nodes, weights | more_weights
         inputs.append((given, [f"{prefix}rows", width]))
         outputs.append((f"{prefix}correction", [f"{prefix}rows", answers]))
-    card = replace(DEFAULT_CARD, base="catmull-clark", face_features="face-8", **changes)
+    card = replace(POLYGON_CARD, **changes)
     data = model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
     return model_from_bytes(data, "polygons")
 
@@ -232,3 +236,35 @@ class Float64Model:
 
     def sharpness(self, features):
         raise AssertionError("format 1 has no sharpness network")
+
+
+class TiedPolygonModel:
+    """Networks in double precision with the symmetries of their features, by averaging."""
+
+    name, hash, card = "tied", "0" * 64, POLYGON_CARD
+
+    def __init__(self, seed):
+        self.networks = {
+            seen.name: (float64_network(random_layers(seed, (seen.count, 16, 3))), seen.symmetries)
+            for seen in (SIGNED_18, RING_10, FACE_8)
+        }
+
+    def _answers(self, name, features, budget):
+        network, group = self.networks[name]
+        turned = [
+            local * network(signs * features[:, order])
+            for order, signs, local in zip(group.order, group.signs, group.local, strict=True)
+        ]
+        return budget * np.mean(turned, axis=0)
+
+    def __call__(self, features, budget):
+        return self._answers("signed-18", features, budget)
+
+    def vertex_correction(self, features, budget):
+        return self._answers("ring-10", features, budget)
+
+    def sharpness(self, features):
+        raise AssertionError("the card names no sharpness network")
+
+    def face_correction(self, features, budget):
+        return self._answers("face-8", features, budget)[:, :1]

@@ -66,7 +66,7 @@ def _off_loop(subject: Subject, mesh: Mesh, axis: int) -> float:
 
 def _on_curves(made: Step) -> np.ndarray:
     curves = Curves(made.level, torch.tensor(made.mesh.vertices))
-    return (curves.moved | curves.of_boundary).numpy()
+    return ((curves.shares > 0) | curves.of_boundary).numpy()
 
 
 def _turned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:

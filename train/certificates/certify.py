@@ -12,6 +12,7 @@ from rich.table import Table
 
 from pns_common import ModelError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
+from pns_common.schemes import CATMULL_CLARK
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
 from train.certificates.displacement import bounded_displacement
@@ -26,6 +27,7 @@ from train.certificates.learned_once import (
 )
 from train.certificates.model_file import keeps_its_word
 from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
+from train.certificates.polygons import polygon_steps
 from train.certificates.scaling import (
     lipschitz_slope,
     normal_variation_slope,
@@ -100,7 +102,12 @@ def certify_model_file(
 def scheme_steps(
     subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
 ) -> list[Step]:
-    """Return the certificates of a scheme, ready to run."""
+    """Return the certificates of a scheme, ready to run.
+
+    A scheme over Catmull–Clark is tried on polygons of its own.
+    """
+    if subject.card is not None and subject.card.base == CATMULL_CLARK.name:
+        return [Step(*step) for step in polygon_steps(subject, seed, valences)]
     shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
     every = (*shaped, *real)
     return [

@@ -61,6 +61,12 @@ class DoubleModel:
         """Return the weights for the rings of old vertices, float64."""
         return self._answer("vertex_correction", "vertex_features", features, budget)
 
+    def face_correction(
+        self, features: Float[np.ndarray, "N M"], budget: float
+    ) -> Float[np.ndarray, "N 1"]:
+        """Return the lengths along the normals of faces, float64."""
+        return self._answer("face_correction", "face_features", features, budget)
+
     def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
         """Return the sharpness of edges, float64."""
         return self._answer("sharpness", "sharpness_features", features, 1.0)
@@ -98,7 +104,7 @@ def double_model(model: OnnxModel, data: bytes) -> DoubleModel:
 
 def read_bytes(source: str | Path) -> bytes:
     """Read the bytes of a bundled model or of a file that `load_model` has accepted."""
-    if isinstance(source, str) and source in bundled_models():
+    if isinstance(source, str) and source in bundled_models(companions=True):
         return (BUNDLED / f"{source}.onnx").read_bytes()
     return Path(source).read_bytes()
 

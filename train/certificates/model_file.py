@@ -6,14 +6,14 @@ that breaks its contract, or claims what it does not reach, is not to be trusted
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common import pns
-from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
-from pns_common.model.session import Model
+from pns_common.model.card import EDGE_FEATURES, FACE_FEATURES, VERTEX_FEATURES
+from pns_common.model.session import Model, PolygonModel
 from train.certificates.subject import Certificate
 from train.metrics.card import MEASURES
 
@@ -32,6 +32,9 @@ def keeps_its_word(model: Model) -> list[Certificate]:
     if model.card.vertex_features is not None:
         count = VERTEX_FEATURES[model.card.vertex_features]
         rows += _answers(model.vertex_correction, count, "vertex corrections")
+    if model.card.face_features is not None:
+        count = FACE_FEATURES[model.card.face_features]
+        rows += _answers(cast(PolygonModel, model).face_correction, count, "face corrections")
     return [*rows, _metrics(model)]
 
 
