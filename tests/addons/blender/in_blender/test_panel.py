@@ -49,7 +49,7 @@ def test_without_an_object_nothing_but_the_button():
 def test_the_forecast_stands_below_the_button():
     cube()
     lines = drawn(panel.VIEW3D_PT_pns)
-    assert any("triangles from 12" in line for line in lines)
+    assert any("24 faces from 6" in line for line in lines)
 
 
 def test_a_million_faces_are_warned_of():
