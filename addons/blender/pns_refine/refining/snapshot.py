@@ -99,7 +99,7 @@ class Snapshot:
 
     @property
     def has_polygons(self) -> bool:
-        """Whether a face has more than three corners."""
+        """Tell whether a face has more than three corners."""
         return len(self.triangles) != len(self.polygon_corners) - 1
 
     def control(self, *, whole: bool) -> Control:
@@ -120,7 +120,7 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """What is refined: the mesh, the snapshot's corner of each corner, its polygon of each face."""
+    """The mesh to refine, the snapshot's corner of each corner, and its polygon of each face."""
 
     mesh: Mesh
     corners: Int[np.ndarray, " H"]

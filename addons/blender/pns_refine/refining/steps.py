@@ -110,7 +110,7 @@ def level_steps(
     for depth in range(levels):
         sharp, soft = pairs[crease_sharpness >= 1], soft if soft.sharp_at(depth) else NO_CREASES
         topology = with_creases(soft.applied_by_name(plain), sharp)
-        mixture = _mixture(plain, pairs, crease_sharpness, soft)
+        mixture = _mixture(plain, base, pairs, crease_sharpness, soft)
         steps.append(Step(topology, sharp, soft, mixture))
         soft = _halves(soft, plain)
         pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
@@ -175,11 +175,15 @@ def _halves(soft: Creases, topology: Topology) -> Creases:
 
 def _mixture(
     plain: Topology,
+    base: BaseScheme,
     pairs: Int[np.ndarray, "N 2"],
     crease_sharpness: Float[np.ndarray, " N"],
     soft: Creases,
 ) -> Mixture | None:
-    """Mix edges of less than a level left: sharp by that share, and their ends by their mean."""
+    """Mix edges of less than a level left: sharp by that share, their ends by the mean.
+
+    The vertex of a face takes the largest share of its edges.
+    """
     ending = crease_sharpness < 1
     if not ending.any():
         return None
@@ -191,7 +195,10 @@ def _mixture(
     count = np.bincount(ends, minlength=plain.vertex_count)
     at_vertices = total / np.maximum(count, 1)
     topology = with_creases(soft.applied_by_name(plain), pairs)
-    return Mixture(topology, pairs, np.concatenate([at_vertices, at_edges])[:, None])
+    shares = [at_vertices, at_edges]
+    if base.polygons:
+        shares.append(np.maximum.reduceat(at_edges[plain.corner_edges], plain.offsets[:-1]))
+    return Mixture(topology, pairs, np.concatenate(shares)[:, None])
 
 
 def _worn(
