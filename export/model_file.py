@@ -37,6 +37,7 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
         checkpoint_card(checkpoint),
         path,
         vertex_network=checkpoint.vertex_network,
+        sharpness_network=checkpoint.sharpness_network,
     )
 
 
@@ -72,12 +73,13 @@ ORDER = (
     "pool",
     "reuse",
     "trained_strength",
+    "start",
     "learning_rate",
     "final_learning_rate",
     "seed",
     "quiet",
     "vertex",
-    "distilled",
+    "sharpness",
     "machine",
 )
 
@@ -95,13 +97,14 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     if vertex is not None:
         on_card["vertex_features"] = recipe["vertex"].pop("features")
         on_card["vertex_gate_sharpness"] = recipe["vertex"].pop("gate_sharpness")
+    if checkpoint.recipe.sharpness is not None:
+        on_card["sharpness_features"] = recipe["sharpness"].pop("features")
     if form is not None:
         on_card |= recipe.pop("scale_free")
     # One level of names: how it was trained stands beside the rest.
     name = recipe.pop("name")
     facts = {"recipe": RECORDED.get(name, name), **recipe, **recipe.pop("training")}
     facts["machine"] = checkpoint.machine
-    facts["distilled"] = msgspec.to_builtins(checkpoint.distilled)
     # In the order of the first models' cards, without what a recipe leaves out.
     given = {name: facts[name] for name in ORDER if facts.get(name) is not None}
     return ModelCard(

@@ -3,9 +3,10 @@
 A B-spline runs inside the bends of its polygon: the limit of a vertex p between a and b is
 p + (a + b − 2 p) / 6. Pushing p the other way, across the curve, undoes that:
 
-    d_p = −γ_p (u − (u · t) t) / 3        u = (a + b) / 2 − p, t the direction from a to b
+    d_p = −γ_p (w₂ − w₃) (u − (u · t) t) / 3     u = (a + b) / 2 − p, t the direction from a to b
 
-with γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning angle at p: 0 where the curve is
+with a, b the ends of the two sharpest edges at p, w₂ and w₃ the weights of its second and third
+sharpest, γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning angle at p: 0 where the curve is
 straight, and 0 at corners of a right angle or more. Nothing here reads the surface beside the
 curve, so two meshes that share a boundary and R move it alike.
 """
@@ -28,16 +29,17 @@ TWO = 2
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """The curves of a mesh.
+    """The curves of a mesh: its edges of sharpness above 0 that are not irregular.
 
     Attributes:
-        movable: (V,) vertices on exactly two edges of curves and on no irregular edge, not pinned.
+        movable: (V,) vertices with w₂ > w₃, on no irregular edge, not pinned.
         rows: their numbers.
         sides: (N, 2) the two neighbours of each along the curve.
         a, b: (N, 3) from each to these.
         ends: (K, 2) ends of the curve edges that end at a movable vertex.
         new_rows: (N + K,) new vertices on curves, rows of the refined mesh: movable vertices, then
             the vertices of these edges.
+        shares: how far each is on a curve: w₂ − w₃, and w of these edges.
         squares: their h²: mean square of both spokes; square of the edge's length.
         shared: (W,) new vertices that a boundary alone places.
     """
@@ -49,6 +51,7 @@ class Curves:
     b: Float[np.ndarray, "N 3"]
     ends: Integer[np.ndarray, "K 2"]
     new_rows: Integer[np.ndarray, " M"]
+    shares: Float[np.ndarray, " M"]
     squares: Float[np.ndarray, " M"]
     shared: Bool[np.ndarray, " W"]
 
@@ -61,27 +64,33 @@ def find_curves(
     edge_count = len(mesh.edges)
     shared = np.zeros(row_count or count + edge_count, dtype=bool)
     movable = np.zeros(count, dtype=bool)
-    if sharp is None or len(mesh.sharp_edges) == 0:
+    if sharp is None:
         rows, pairs, none = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3))
-        return Curves(movable, rows, pairs, none, none, pairs, rows, np.zeros(0), shared)
-    edges = mesh.sharp_edges[kinds[mesh.sharp_edges] != connectivity.IRREGULAR]
-    of_curve = np.bincount(mesh.edges[edges].reshape(-1), minlength=count)
-    movable = (of_curve == TWO) & (mesh.sharp_count == TWO)
+        nothing = np.zeros(0)
+        return Curves(movable, rows, pairs, none, none, pairs, rows, nothing, nothing, shared)
+    share = sharp.weights[:, 1] - sharp.weights[:, 2]
+    irregular = kinds == connectivity.IRREGULAR
+    movable = share > 0
+    movable[mesh.edges[irregular].reshape(-1)] = False
     movable[mesh.pinned] = False
     rows = np.flatnonzero(movable)
     sides = sharp.neighbours[rows]
     a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))
+    edges = np.flatnonzero((mesh.sharpness > 0) & ~irregular)
     ends = mesh.edges[edges]
     moves = movable[ends[:, 0]] | movable[ends[:, 1]]
-    edges, ends = edges[moves].astype(np.int64), ends[moves]
+    edges, ends = edges[moves], ends[moves]
     along = points[ends[:, 1]] - points[ends[:, 0]]
     on_boundary = kinds == connectivity.BOUNDARY
     if on_boundary.any():
-        shared[:count], shared[count : count + edge_count] = movable, on_boundary
-        shared[mesh.edges[mesh.crease_edges].reshape(-1)] = False
-    squares = [(_square(a) + _square(b)) / 2, _square(along)]
+        alone = sharp.weights[:, 2] == 0
+        of_boundary = np.bincount(mesh.edges[on_boundary].reshape(-1), minlength=count)
+        shared[:count] = movable & alone & (of_boundary == TWO)
+        shared[count : count + edge_count] = on_boundary
     new_rows = np.concatenate([rows, count + edges])
-    return Curves(movable, rows, sides, a, b, ends, new_rows, np.concatenate(squares), shared)
+    shares = np.concatenate([share[rows], mesh.sharpness[edges]])
+    squares = np.concatenate([(_square(a) + _square(b)) / 2, _square(along)])
+    return Curves(movable, rows, sides, a, b, ends, new_rows, shares, squares, shared)
 
 
 def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 3"]:
@@ -93,7 +102,7 @@ def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 
     along, middle = _unit(b - a), (a + b) / 2
     off = middle - np.einsum("ij,ij->i", middle, along)[:, None] * along
     pushes = np.zeros((len(curves.movable), 3))
-    pushes[curves.rows] = -(gate / 3)[:, None] * off
+    pushes[curves.rows] = -(curves.shares[: len(curves.rows)] * gate / 3)[:, None] * off
     return pushes
 
 

@@ -21,9 +21,10 @@ The default's rule, models of format 4, acts at the control mesh alone:
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
-C is the budget, R the mesh's unit of length, τ the share of h that the network may ask for. A soft
-edge of sharpness w is corrected by (1 − w) δ, a sharp one not at all. On a boundary or a crease
-there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it still meet there.
+C is the budget, R the mesh's unit of length, τ the share of h that the network may ask for. On a
+boundary or a crease there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it
+still meet there. Sharpness in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an edge,
+(1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex.
 """
 
 from __future__ import annotations
@@ -169,7 +170,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 
     curves = find_curves(level.points, mesh, len(x))
     vertices, faces = np.flatnonzero(level.ringed), np.arange(len(x) - count - len(mesh.edges))
-    delta = prior(level, rule, curves)  # D, to become δ
+    delta, along = prior(level, rule, curves)  # D, to become δ
     made = _Rows.starting_with(delta)
 
     def at_vertices(begin: int, end: int) -> None:
@@ -188,7 +189,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     blocks.run(len(vertices), at_vertices)
     blocks.run(len(faces), at_faces)
     degenerate: int = sum(blocks.run(len(edges), at_edges))
-    made.correct_curves(curves, budget_per_length(level, rule))
+    made.add_on_curves(curves, along, budget_per_length(level, rule))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
     made.scale(scale)
     x += delta
@@ -198,18 +199,21 @@ def learned_level(level: Level, rule: Rule) -> Additions:
 # --- what surrounds the networks ------------------------------------------------------------------
 
 
-def prior(level: Level, rule: Rule, curves: Curves) -> Float[np.ndarray, "W 3"]:
-    """Return D = S d of every new vertex; 0 at those that the rule does not move."""
-    d, along = pushes(level, rule), None
-    if len(curves.rows) and rule.curve_strength:
-        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-        d += along
-    made = level.base.place(d, level.topology, level.blocks)
+def prior(
+    level: Level, rule: Rule, curves: Curves
+) -> tuple[Float[np.ndarray, "W 3"], Float[np.ndarray, "M 3"]]:
+    """Return D = S d of every new vertex, and D along the curves at those on curves.
+
+    The first is 0 at those that the rule of surfaces does not move.
+    """
+    d, along = (
+        pushes(level, rule),
+        rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness),
+    )
+    made = level.base.place(d + along, level.topology, level.blocks)
     at_rest = np.concatenate([~level.ringed, level.topology.edge_class != INTERIOR])
     made[: len(at_rest)][at_rest] = 0.0
-    if along is not None:
-        made[curves.new_rows] = curve_prior(curves, along)
-    return made
+    return made, curve_prior(curves, along)
 
 
 def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
@@ -432,10 +436,13 @@ class _Rows:
         read = at.rows, first, 0, len(at.rows), z, at.basis, at.reach, at.gate, at.bound, at.weight
         correction.correct_by_prior(*read, *self.arrays)
 
-    def correct_curves(self, curves: Curves, budget_per_length: float) -> None:
-        """Put Π_ρ(D) in place of D on curves."""
+    def add_on_curves(
+        self, curves: Curves, along: Float[np.ndarray, "M 3"], budget_per_length: float
+    ) -> None:
+        """Add Π_ρ(D) along curves, by the share of each new vertex on one."""
         bound = budget_per_length * curves.squares
-        correction.correct_curves(curves.new_rows, bound, self.displacement, self.ratio, self.bound)
+        read = curves.new_rows, curves.shares, along, bound
+        correction.add_on_curves(*read, self.displacement, self.ratio, self.bound)
 
     def scale(self, by: Float[np.ndarray, " W"]) -> None:
         """Put s δ in place of δ."""

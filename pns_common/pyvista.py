@@ -22,7 +22,7 @@ from pns_common.schemes import Scheme, loop
 
 @pyvista.register_dataset_accessor("pns", pyvista.PolyData)
 class PnsAccessor:
-    """Refines a PolyData of triangles; point, cell and field data are kept."""
+    """Refines a PolyData; point, cell and field data are kept."""
 
     def __init__(self, mesh: pyvista.PolyData):
         self._mesh = mesh

@@ -28,6 +28,8 @@ from pns_common.parallel import Blocks
 from pns_common.schemes import Scheme, loop
 from pns_common.topology import Topology
 
+# Below 1, since what is marked as sharp for good changes the features of corrections beside it.
+SHARPEST = 1 - 2.0**-52
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
 WHOLE = 1 + kernels.STEPS
 CREASE_53 = kernels.LOCAL + WHOLE
@@ -114,7 +116,7 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
     def ask(begin: int, end: int) -> None:
         asked = rows[begin:end]
         answers = checked_answers(network, seen.features(asked), 1)
-        made[asked] = gate[asked] * np.clip(answers[:, 0], 0.0, 1.0)
+        made[asked] = np.minimum(gate[asked] * np.clip(answers[:, 0], 0.0, 1.0), SHARPEST)
 
     level.blocks.quiet().of_rows(NETWORK_ROWS).run(len(rows), ask)
     return made

@@ -2,7 +2,8 @@
 
 A curve becomes a cubic B-spline; its limit at a vertex p between a and b is p + (a + b − 2 p) / 6.
 The push is that taken back, across the curve, times γ = tanh(c_v x) f(x): x = 1 − the cosine of the
-turning angle, and f falls from 1 at 60 degrees to 0 at 90, since sharper corners are meant.
+turning angle, and f falls from 1 at 60 degrees to 0 at 90, since sharper corners are meant. A
+vertex belongs to the curve along its two sharpest edges by w₂ − w₃.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from train.connectivity import Connectivity
+from train.loop_masks import CURVE_CENTRE, CURVE_SIDE
 from train.tensors import dot, unit
 
 BEND, CORNER = 1 / 2, 1.0
@@ -20,32 +22,33 @@ BEND, CORNER = 1 / 2, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """The curves of a mesh: boundaries, and edges of sharpness 1 between two faces."""
+    """The curves of a mesh: boundaries, and edges of sharpness above 0 between two faces."""
 
     mesh: Connectivity
     points: Float[Tensor, "V 3"]
 
-    @property
-    def edges(self) -> Bool[Tensor, " E"]:
-        """Whether an edge is one of a curve."""
-        return self.mesh.boundary | (self.mesh.paired & (self.mesh.sharpness >= 1))
+    @cached_property
+    def irregular(self) -> Bool[Tensor, " E"]:
+        """Whether an edge has neither one face nor two."""
+        return ~(self.mesh.boundary | self.mesh.paired)
 
     @cached_property
-    def movable(self) -> Bool[Tensor, " V"]:
-        """Whether a vertex lies on exactly two edges of curves, and on no other of sharpness 1."""
-        return (self._count(self.edges) == 2) & (self._count(self.mesh.sharpness >= 1) == 2)
+    def at_vertices(self) -> Float[Tensor, " V"]:
+        """w₂ − w₃; 0 at irregular edges."""
+        _, second, third = self.mesh.sharpest[0].T
+        return torch.where(self._count(self.irregular) > 0, 0.0, second - third)
 
-    @property
-    def moved(self) -> Bool[Tensor, " W"]:
-        """Whether a new vertex lies on a curve near a movable vertex."""
-        at_edges = self.edges & self.movable[self.mesh.edges].any(dim=1)
-        return torch.cat([self.movable, at_edges])
+    @cached_property
+    def shares(self) -> Float[Tensor, " W"]:
+        """How far each new vertex is on a curve."""
+        moved = (self.at_vertices > 0)[self.mesh.edges].any(dim=1) & ~self.irregular
+        return torch.cat([self.at_vertices, torch.where(moved, self.mesh.sharpness, 0.0)])
 
     @property
     def of_boundary(self) -> Bool[Tensor, " W"]:
         """Whether the boundary alone places a new vertex."""
-        creases = self._count(self.edges & ~self.mesh.boundary) > 0
-        return torch.cat([self.movable & ~creases, self.mesh.boundary])
+        alone = (self._count(self.mesh.boundary) == 2) & (self.at_vertices == 1)
+        return torch.cat([alone, self.mesh.boundary])
 
     @cached_property
     def sides(self) -> tuple[Float[Tensor, "V 3"], Float[Tensor, "V 3"]]:
@@ -61,13 +64,25 @@ class Curves:
         return torch.cat([(dot(a, a) + dot(b, b)) / 2, dot(along, along)])
 
     def pushes(self, gate_sharpness: float) -> Float[Tensor, "V 3"]:
-        """Return d of all vertices, 0 where they are not movable; `gate_sharpness` is c_v."""
-        a, b = self.sides
-        turning, along, middle = 1 + dot(unit(a), unit(b)), unit(b - a), (a + b) / 2
-        fade = ((CORNER - turning) / (CORNER - BEND)).clamp(0, 1)
-        gate = self.movable * torch.tanh(gate_sharpness * turning) * fade
-        across = middle - dot(middle, along)[:, None] * along
-        return -(gate / 3)[:, None] * across
+        """Return d of all vertices; `gate_sharpness` is c_v."""
+        return self.at_vertices[:, None] * curve_push(*self.sides, gate_sharpness)
+
+    def prior(self, pushes: Float[Tensor, "V 3"]) -> Float[Tensor, "W 3"]:
+        """Return D along the curves: the curve rules applied to pushes."""
+        beside = pushes[self.mesh.sharpest[1][:, :2]].sum(dim=1)
+        middle = pushes[self.mesh.edges].mean(dim=1)
+        return torch.cat([CURVE_CENTRE * pushes + CURVE_SIDE * beside, middle])
 
     def _count(self, edges: Bool[Tensor, " E"]) -> Tensor:
         return torch.bincount(self.mesh.edges[edges].reshape(-1), minlength=self.mesh.vertex_count)
+
+
+def curve_push(
+    a: Float[Tensor, "V 3"], b: Float[Tensor, "V 3"], gate_sharpness: float
+) -> Float[Tensor, "V 3"]:
+    """Return d of vertices on curves, from the ways to both neighbours; `gate_sharpness` is c_v."""
+    turning, along, middle = 1 + dot(unit(a), unit(b)), unit(b - a), (a + b) / 2
+    fade = ((CORNER - turning) / (CORNER - BEND)).clamp(0, 1)
+    gate = torch.tanh(gate_sharpness * turning) * fade
+    across = middle - dot(middle, along)[:, None] * along
+    return -(gate / 3)[:, None] * across

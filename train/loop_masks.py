@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from train.connectivity import Connectivity, next_corner
+from train.connectivity import Connectivity
 
 EDGE_END, EDGE_OPPOSITE, MIDDLE = 3 / 8, 1 / 8, 1 / 2
 CURVE_CENTRE, CURVE_SIDE = 3 / 4, 1 / 8
@@ -117,24 +117,3 @@ def _dart_limit(mesh: Connectivity, dart: int) -> tuple[Tensor, Tensor, Tensor]:
     system = np.vstack([matrix.T - np.eye(len(around)), np.ones(len(around))])
     weights = np.linalg.lstsq(system, np.eye(len(around) + 1)[-1], rcond=None)[0]
     return torch.full((len(around),), dart), torch.tensor(around), torch.from_numpy(weights)
-
-
-def tangent_masks(mesh: Connectivity) -> tuple[Mask, Mask]:
-    """Return Σ cos(2πj/k) p_j and Σ sin(2πj/k) p_j around ringed vertices, anticlockwise."""
-    corners, count, twin = mesh.faces.reshape(-1).numpy(), mesh.vertex_count, mesh.twins.numpy()
-    start = np.full(count, -1)
-    start[corners] = np.arange(len(corners))
-    centres, valence = np.flatnonzero(mesh.ringed.numpy()), mesh.valence.numpy()
-    corner, rows, columns, angles = start[centres], [], [], []
-    # All rings at once, neighbour by neighbour.
-    for turn in range(int(valence[centres].max(initial=0))):
-        corner, centres = (part[valence[centres] > turn] for part in (corner, centres))
-        rows.append(centres)
-        columns.append(corners[next_corner(corner)])
-        angles.append(2 * np.pi * turn / valence[centres])
-        corner = twin[next_corner(next_corner(corner))]
-    empty = [np.zeros(0, dtype=np.int64)]
-    row, column = (torch.from_numpy(np.concatenate(part or empty)) for part in (rows, columns))
-    angle = torch.from_numpy(np.concatenate(angles or [np.zeros(0)]))
-    shape = (count, count)
-    return Mask(shape, row, column, torch.cos(angle)), Mask(shape, row, column, torch.sin(angle))

@@ -83,25 +83,26 @@ class Surroundings:
 
     @cached_property
     def height(self) -> Float[Tensor, "V 1"]:
-        """u_v · m_v / h_v; 0 at sharp edges."""
+        """u_v · m_v / h_v; 0 at edges that are sharp for good."""
         lean = dot(self.umbrella, self.mean_normal)[:, None]
-        return (1 - self.mesh.sharpest[0][:, :1]) * ratio(lean, root(self.square))
+        return (self.mesh.sharpest[0][:, :1] < 1) * ratio(lean, root(self.square))
 
     @cached_property
     def turns(self) -> tuple[Float[Tensor, "S 1"], Float[Tensor, "S 1"]]:
-        """x = ‖n − n'‖² / 2 and s = (n × n') · T of each spoke; 0 at sharp edges."""
+        """x = ‖n − n'‖² / 2 and s = (n × n') · T of each spoke; 0 at edges sharp for good."""
         left = read_edges(self, first_face=False)
         whole = (dot(left.n1, left.n1) > 0) & (dot(left.n2, left.n2) > 0)
         apart, across = left.n1 - left.n2, torch.linalg.cross(left.n1, left.n2)
         both = (torch.where(whole, dot(apart, apart) / 2, 0.0), dot(across, unit(left.b - left.a)))
-        smooth = 1 - self.mesh.sharpness
+        smooth = self.mesh.sharpness < 1
         jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
         return jump, bend
 
     @cached_property
     def gentler_bend(self) -> Float[Tensor, " E"]:
         """The smaller mean of x over the edges of an edge's two faces."""
-        bends = self.turns[0][::2, 0][self.mesh.face_edges].mean(dim=1)
+        jumps = (1 - self.mesh.sharpness) * self.turns[0][::2, 0]
+        bends = jumps[self.mesh.face_edges].mean(dim=1)
         return bends[self.mesh.half_edges // 3].min(dim=1).values
 
 
@@ -323,7 +324,10 @@ class GeneralRule:
         around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
         curves = Curves(mesh, points)
         of_curves = self.boundary_strength * curves.pushes(self.vertex_gate_sharpness)
-        prior, along = masks(self.prior_strength * pushes(around) + of_curves), masks(of_curves)
+        prior, along = (
+            masks(self.prior_strength * pushes(around) + of_curves),
+            curves.prior(of_curves),
+        )
         edges = read_edges(around, first_face=False)
         frames = edge_frames(edges, first_face=False)
         interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
@@ -343,11 +347,12 @@ class GeneralRule:
         asked = prior + self.network_scale * torch.cat([pulled, turned])
         squares = torch.cat([around.square[:, 0] * ringed, frames.length**2 * interior])
         # On curves there is neither gate nor network.
-        on_curve, gate = curves.moved, torch.cat([vertex_gate, edge_gate])
-        squares = torch.where(on_curve, curves.squares, squares)
-        envelope = self.budget / reference_length * squares
-        share = torch.where(on_curve, 1.0 * on_curve, gate)[:, None]
-        displacement = share * shortened(torch.where(on_curve[:, None], along, asked), envelope)
+        share, gate = curves.shares, torch.cat([vertex_gate, edge_gate])
+        unit_budget = self.budget / reference_length
+        envelope, on_curve = unit_budget * squares, unit_budget * curves.squares
+        displacement = gate[:, None] * shortened(asked, envelope)
+        displacement = displacement + share[:, None] * shortened(along, on_curve)
+        envelope = (1 - share) * envelope + share * on_curve
         base, alone = masks(points), curves.of_boundary
         scale = fold_guard(mesh.split(), base, displacement, self.fold_angle, alone)
         return Step(base, displacement, envelope, gate, scale)

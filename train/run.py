@@ -24,11 +24,10 @@ from train.certificates.command import certify_command
 from train.experiments.beyond.validation import validate_command
 from train.experiments.command import reproduce_command
 from train.fitting.determinism import machine_fingerprint
-from train.fitting.trainer import fit
+from train.fitting.trainer import Fit, fit
 from train.metrics.card import card_metrics
 from train.metrics.one_step import improvement_table, improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
@@ -84,7 +83,7 @@ def train(
     with _progress(console) as progress:
         task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
         trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
-    _measure_and_save(path, chosen, trained.network, trained.vertex_network, console)
+    _measure_and_save(path, chosen, trained, console)
     _say_written(path, began, console)
 
 
@@ -98,18 +97,13 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
         raise typer.Exit(1) from error
 
 
-def _measure_and_save(
-    path: Path,
-    recipe: Recipe,
-    network: BoundedNet,
-    vertex_network: BoundedNet | None,
-    console: Console,
-) -> None:
-    scheme = pns(recipe_model(recipe, network, vertex_network), recipe.budget)
+def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
+    network, others = trained.network, (trained.vertex_network, trained.sharpness_network)
+    scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
     improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
     machine = machine_fingerprint()
-    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, vertex_network))
+    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, *others))
     for name, rows in improvements.items():
         console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
 

@@ -21,7 +21,7 @@ from pns_common.parallel import Blocks
 from pns_common.refinement import Refinement, refine
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
-from pns_common.topology import build_topology, split_faces, split_triangles
+from pns_common.topology import Topology
 
 # The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
 CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
@@ -35,25 +35,25 @@ def _nothing() -> Data:
 
 @dataclass(frozen=True, eq=False)
 class CarriedMesh:
-    """A triangle mesh of another library.
+    """A mesh of another library.
 
     Attributes:
         vertices: (V, 3) positions; several may be equal where other data differ.
-        faces: (F, 3) vertices of each face.
+        faces: vertices of each face, as ``Mesh`` takes them: (F, 3), (F, 4), (corners, offsets).
         points: data of vertices by name, (V, …) each.
-        corners: data of face corners by name, (F, 3, …) each.
+        corners: data of face corners by name, (F, N, …) each; (H, …) where degrees differ.
         cells: data of faces by name, (F, …) each.
     """
 
     vertices: Float[np.ndarray, "V 3"]
-    faces: Integer[np.ndarray, "F 3"]
+    faces: Integer[np.ndarray, "F N"] | tuple[Integer[np.ndarray, " H"], Integer[np.ndarray, " F1"]]
     points: Data = field(default_factory=_nothing)
     corners: Data = field(default_factory=_nothing)
     cells: Data = field(default_factory=_nothing)
 
 
 def refine_carried(
-    mesh: CarriedMesh, scheme: Scheme, levels: SupportsIndex, options: Mapping[str, Any]
+    mesh: CarriedMesh, scheme: Scheme | str, levels: SupportsIndex, options: Mapping[str, Any]
 ) -> tuple[CarriedMesh, Refinement]:
     """Return the refined mesh with its data, and the refinement of the joined surface.
 
@@ -76,21 +76,31 @@ def refine_carried(
         options["creases"] = replace(creases, named=_renamed(creases.named, joined))
     elif creases is not None and not isinstance(creases, str | Creases):
         options["creases"] = _renamed(creases, joined)
-    refinement = refine(Mesh(given.vertices[first], joined[given.faces]), scheme, levels, **options)
+    surface_faces = joined[given.corners], given.offsets
+    refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
 
-    blocks, topology = Blocks(), build_topology(given.faces, len(given.vertices))
+    blocks, topology, base = Blocks(), given.topology(), refinement.scheme.base
     points, corners, cells = dict(mesh.points), dict(mesh.corners), dict(mesh.cells)
     for depth in range(len(refinement.steps)):
-        topology = split_triangles(topology, blocks) if depth else topology
+        topology = base.split(topology, blocks) if depth else topology
+        degrees = np.diff(topology.offsets) if base.polygons else 4
         for name, values in points.items():
             ends = (values[topology.edges[:, side]] for side in (0, 1))
-            points[name] = np.concatenate([values, between(*ends)])
-        corners = {name: corner_children(values) for name, values in corners.items()}
-        cells = {name: np.repeat(values, 4, axis=0) for name, values in cells.items()}
-    faces = split_faces(topology, blocks, np.int64)
+            parts = [values, between(*ends)]
+            if base.polygons:
+                parts.append(mean_of_faces(values[topology.corners], topology))
+            points[name] = np.concatenate(parts)
+        corners = {
+            name: quad_corners(values, topology) if base.polygons else corner_children(values)
+            for name, values in corners.items()
+        }
+        cells = {name: np.repeat(values, degrees, axis=0) for name, values in cells.items()}
+    faces = base.faces(topology, blocks, np.int64)
 
     # Both meshes have their faces in one order, so their corners correspond.
-    surface = np.zeros(topology.vertex_count + len(topology.edges), dtype=np.int64)
+    count = topology.vertex_count + len(topology.edges)
+    count += topology.face_count if base.polygons else 0
+    surface = np.zeros(count, dtype=np.int64)
     surface[: len(joined)] = joined
     surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
     positions = refinement.mesh.vertices[surface]
@@ -128,6 +138,35 @@ def corner_children(corners: Shaped[np.ndarray, " F 3 *K"]) -> Shaped[np.ndarray
     edges = between(corners, np.roll(corners, -1, axis=1))
     six = np.concatenate([corners, edges], axis=1)
     return six[:, CHILDREN].reshape(-1, *corners.shape[1:])
+
+
+def quad_corners(
+    corners: Shaped[np.ndarray, " H *K"] | Shaped[np.ndarray, " F N *K"], topology: Topology
+) -> Shaped[np.ndarray, " H 4 *K"]:
+    """Return the corners' data of the quads that a mesh of polygons is split into."""
+    is_flat = len(corners) == len(topology.corners)
+    flat = corners if is_flat else corners.reshape(-1, *corners.shape[2:])
+    before = np.arange(-1, len(flat) - 1)
+    before[topology.offsets[:-1]] = topology.offsets[1:] - 1
+    entering = between(flat[before], flat)
+    leaving = np.empty_like(entering)
+    leaving[before] = entering
+    centres = mean_of_faces(flat, topology)[topology.face_of(np.arange(len(flat)))]
+    return np.stack([flat, leaving, centres, entering], axis=1)
+
+
+def mean_of_faces(
+    corners: Shaped[np.ndarray, " H *K"], topology: Topology
+) -> Shaped[np.ndarray, " F *K"]:
+    """Return the mean of the data at each face's corners; of labels the first."""
+    kind = corners.dtype.kind
+    if kind not in "fc" and corners.dtype != np.uint8:
+        return corners[topology.offsets[:-1]]
+    # Shares first: the sum of all may be more than the type holds.
+    degrees = np.diff(topology.offsets).reshape(-1, *[1] * (corners.ndim - 1))
+    shares = corners / np.repeat(degrees, degrees.reshape(-1), axis=0)
+    means = np.add.reduceat(shares, topology.offsets[:-1])
+    return (means if kind in "fc" else np.rint(means)).astype(corners.dtype)
 
 
 def between(

@@ -1,4 +1,4 @@
-"""meshio.Mesh of triangles: blocks stay blocks; point, cell and field data and sets are kept."""
+"""meshio.Mesh: blocks stay blocks; point, cell and field data and sets are kept."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from pns_common.errors import MeshError
 from pns_common.interop.carried import CarriedMesh
 from pns_common.mesh import fans
+from pns_common.quads import QUAD
 
 
 def read_meshio(mesh: Any) -> CarriedMesh:
@@ -17,11 +18,14 @@ def read_meshio(mesh: Any) -> CarriedMesh:
     Raises:
         MeshError: it has cells of another type.
     """
-    other = sorted({block.type for block in mesh.cells} - {"triangle"})
+    other = sorted({block.type for block in mesh.cells} - {"triangle", "quad", "polygon"})
     if other or not mesh.cells:
         kinds = ", ".join(other) or "none"
-        raise MeshError(f"cells of type {kinds}, expected triangle", element="cells")
-    faces = np.concatenate([np.asarray(block.data, dtype=np.int64) for block in mesh.cells])
+        raise MeshError(f"cells of type {kinds}, expected triangle or quad", element="cells")
+    blocks = [np.asarray(block.data, dtype=np.int64) for block in mesh.cells]
+    degrees = np.concatenate([np.full(len(block), block.shape[1]) for block in blocks])
+    corners = np.concatenate([block.reshape(-1) for block in blocks])
+    faces = corners, np.concatenate([[0], np.cumsum(degrees)])
     points = {name: np.asarray(values) for name, values in mesh.point_data.items()}
     cells = {name: np.concatenate(blocks) for name, blocks in mesh.cell_data.items()}
     vertices = np.asarray(mesh.points, dtype=np.float64)
@@ -48,19 +52,22 @@ def triangulated_meshio(mesh: Any) -> Any:
 
 def write_meshio(refined: CarriedMesh, given: Any) -> Any:
     """Return a mesh of the class of ``given``, in its blocks."""
-    # Every face has as many descendants, one after another.
-    children = len(refined.faces) // sum(len(block.data) for block in given.cells)
-    starts = children * np.cumsum([len(block.data) for block in given.cells])[:-1]
+    sizes, degrees = zip(*(np.shape(block.data) for block in given.cells), strict=True)
+    # A triangle's four children have as many each; a quad comes of each corner.
+    degree = int(np.shape(refined.faces)[1])
+    parts = np.array(degrees) if degree == QUAD else np.ones(len(degrees), dtype=np.int64)
+    children = len(refined.faces) // int(np.dot(parts, sizes)) * parts
+    starts = np.cumsum(children * sizes)[:-1]
     return type(given)(
         refined.vertices[:, : given.points.shape[1]],
-        [("triangle", faces) for faces in np.split(refined.faces, starts)],
+        [("quad" if degree == QUAD else "triangle", f) for f in np.split(refined.faces, starts)],
         point_data=dict(refined.points),
         cell_data={name: np.split(values, starts) for name, values in refined.cells.items()},
         field_data=given.field_data,
         # Points keep their numbers.
         point_sets=given.point_sets,
         cell_sets={
-            name: [_descendants(block, children) for block in blocks]
+            name: [_descendants(*each) for each in zip(blocks, children.tolist(), strict=True)]
             for name, blocks in given.cell_sets.items()
         },
         info=given.info,

@@ -36,7 +36,7 @@ def write_open3d(refined: CarriedMesh, given: Any) -> Any:
     points = cast(Any, type(given.vertices))
     triangles = cast(Any, type(given.triangles))
     made.vertices = points(refined.vertices)
-    made.triangles = triangles(refined.faces.astype(np.int32))
+    made.triangles = triangles(np.asarray(refined.faces, dtype=np.int32))
     made.vertex_colors = points(refined.points.get("colour", np.empty((0, 3))))
     if "uv" in refined.corners:
         made.triangle_uvs = type(given.triangle_uvs)(refined.corners["uv"].reshape(-1, 2))

@@ -1,4 +1,4 @@
-"""pyvista.PolyData of triangles: point, cell and field data are kept, but for normals."""
+"""pyvista.PolyData: point, cell and field data are kept, but for normals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def read_pyvista(mesh: Any) -> CarriedMesh:
     """Return the arrays of a PolyData.
 
     Raises:
-        MeshError: it has no faces, or some with more corners, or lines or points of their own.
+        MeshError: it has no faces, or polygons beside strips, or lines or points of their own.
     """
     if not (len(mesh.faces) or mesh.n_strips):
         raise MeshError("no faces to refine", element="faces")
@@ -23,14 +23,25 @@ def read_pyvista(mesh: Any) -> CarriedMesh:
         what = f"lines ({mesh.n_lines}) and points ({mesh.n_verts}) of their own beside them"
         advice = "give pyvista.PolyData(mesh.points, mesh.faces)"
         raise MeshError(f"{what}; {advice}", element="faces")
-    if not mesh.is_all_triangles:
-        raise MeshError("not triangles alone; triangulate=True cuts them", element="faces")
+    if mesh.n_strips and not mesh.is_all_triangles:
+        raise MeshError("strips beside polygons; triangulate=True cuts them", element="faces")
     # Normals are those of the old surface: they are computed again where they are wanted.
     normals = {mesh.point_data.active_normals_name, mesh.cell_data.active_normals_name}
     points = {k: np.asarray(v) for k, v in mesh.point_data.items() if k not in normals}
     cells = {k: np.asarray(v) for k, v in mesh.cell_data.items() if k not in normals}
-    faces = np.asarray(mesh.regular_faces, dtype=np.int64)
+    faces = np.asarray(mesh.regular_faces, np.int64) if mesh.is_all_triangles else _polygons(mesh)
     return CarriedMesh(np.asarray(mesh.points, dtype=np.float64), faces, points, cells=cells)
+
+
+def _polygons(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners and offsets of faces, which a PolyData has in a row, each behind its size."""
+    padded, starts, at = np.asarray(mesh.faces, dtype=np.int64), list[int](), 0
+    sizes = padded.tolist()
+    while at < len(sizes):
+        starts.append(at)
+        at += sizes[at] + 1
+    offsets = np.concatenate([[0], np.cumsum(padded[starts])])
+    return np.delete(padded, starts), offsets
 
 
 def write_pyvista(refined: CarriedMesh, given: Any) -> Any:

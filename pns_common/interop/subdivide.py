@@ -18,7 +18,7 @@ from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
-from pns_common.refinement import DEFAULT_LEVELS, refine
+from pns_common.refinement import DEFAULT_LEVELS, refine, scheme_for
 from pns_common.schemes import Scheme, pns
 
 AnyMesh = TypeVar("AnyMesh")
@@ -31,6 +31,7 @@ class Adapter:
 
     read: Callable[[Any], CarriedMesh]
     write: Callable[[CarriedMesh, Any], Any]
+    polygons: bool = False
     triangulated: Callable[[Any], Any] | None = None
 
 
@@ -38,8 +39,10 @@ class Adapter:
 ADAPTERS = MappingProxyType(
     {
         ("trimesh", "Trimesh"): Adapter(read_trimesh, write_trimesh),
-        ("pyvista", "PolyData"): Adapter(read_pyvista, write_pyvista, methodcaller("triangulate")),
-        ("meshio", "Mesh"): Adapter(read_meshio, write_meshio, triangulated_meshio),
+        ("pyvista", "PolyData"): Adapter(
+            read_pyvista, write_pyvista, True, methodcaller("triangulate")
+        ),
+        ("meshio", "Mesh"): Adapter(read_meshio, write_meshio, True, triangulated_meshio),
         ("open3d", "TriangleMesh"): Adapter(read_open3d, write_open3d),
     }
 )
@@ -68,7 +71,7 @@ COLLECTIONS = MappingProxyType(
 def subdivide(
     mesh: AnyMesh,
     levels: SupportsIndex = DEFAULT_LEVELS,
-    scheme: Scheme | None = None,
+    scheme: Scheme | str | None = None,
     *,
     triangulate: bool = False,
     **options: Any,
@@ -77,19 +80,20 @@ def subdivide(
 
     Args:
         mesh: a ``Mesh``; a pair (vertices (V, 3), faces (F, 3)) of arrays; a trimesh ``Trimesh``, a
-            pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``, of triangles; or
+            pyvista ``PolyData``, a meshio ``Mesh`` or an open3d ``TriangleMesh``; or
             a trimesh ``Scene`` or pyvista ``MultiBlock`` of such and other parts, which stay.
             Meshes of a library keep texture coordinates, colours and other data, interpolated
             linearly; their vertices at the same position are one vertex of the surface, unless
             ``weld="index"`` is among the options. A pair and a ``Mesh`` are refined as they are.
         levels: number of steps, 1 … 16.
-        scheme: None for ``pns(load_model())``.
+        scheme: as for ``refine``; None for ``pns(load_model())``, which takes polygons too.
         triangulate: cut polygons into triangles first, which is right for convex ones.
         options: further arguments of ``refine``: ``reference_length``, ``creases``, …
 
     Raises:
-        ParameterError: it is a mesh of none of these kinds; and as ``refine``.
-        MeshError: it has other cells than triangles; and as ``refine`` and ``Mesh``.
+        ParameterError: it is a mesh of none of these kinds, or of a library that holds triangles
+            alone and the scheme makes quads; and as ``refine``.
+        MeshError: it has cells that are no faces; and as ``refine`` and ``Mesh``.
     """
     given: Any = mesh
     scheme = pns(load_model()) if scheme is None else scheme
@@ -114,7 +118,12 @@ def subdivide(
     adapter = _adapter(mesh)
     if triangulate and adapter.triangulated is not None:
         mesh = adapter.triangulated(mesh)
-    carried, _ = refine_carried(adapter.read(mesh), scheme, levels, options)
+    read = adapter.read(mesh)
+    chosen = scheme_for(Mesh(read.vertices, read.faces), scheme)
+    if chosen.base.polygons and not adapter.polygons:
+        expected = f"a scheme of triangles: {type(mesh).__name__} holds no quads"
+        raise ParameterError("scheme", chosen.name, expected=expected)
+    carried, _ = refine_carried(read, chosen, levels, options)
     return adapter.write(carried, mesh)
 
 

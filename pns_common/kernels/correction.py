@@ -114,12 +114,19 @@ def correct_by_prior(
 
 
 @kernel
-def correct_curves(rows, bound, displacement, ratio, bounds):
-    """Write δ = Π_ρ(D) at new vertices of curves: ``rows`` of the output, with ρ = ``bound``."""
+def add_on_curves(rows, share, prior, bound, displacement, ratio, bounds):
+    """Add share Π_ρ(D) to δ at new vertices of curves: ``rows`` of the output, with ρ = ``bound``.
+
+    Args:
+        prior: (M, 3) D along the curves.
+        bounds: in: ρ of the rule for surfaces, which acted by 1 − share at most; out: the mean of
+            both bounds.
+    """
     for i in range(len(rows)):
         at = rows[i]
-        delta = shortened(row(displacement, at), bound[i])
+        inside = shortened(row(prior, i), bound[i])
         for k in range(3):
-            displacement[at, k] = delta[k]
-        ratio[at] = norm(delta) / bound[i] if bound[i] > 0 else 0.0
-        bounds[at] = bound[i]
+            displacement[at, k] += share[i] * inside[k]
+        bounds[at] = (1 - share[i]) * bounds[at] + share[i] * bound[i]
+        length = norm(row(displacement, at))
+        ratio[at] = length / bounds[at] if bounds[at] > 0 else 0.0

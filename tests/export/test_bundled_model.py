@@ -2,7 +2,6 @@
 
 import json
 
-import msgspec
 import onnx
 import pytest
 from typer.testing import CliRunner
@@ -19,7 +18,7 @@ from train.fitting.trainer import fit
 from train.metrics.card import MEASURES, card_metrics
 from train.metrics.envelope import envelope_limit
 from train.metrics.one_step import improvements_as_data
-from train.models.checkpoint import Checkpoint, Distillation, save_checkpoint
+from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.from_recipe import initial_network
 from train.models.recipes import RECIPES, paper, signed
 from train.models.torch_model import recipe_model
@@ -134,10 +133,8 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
 @each_model
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
-    recipe, plan = recipe_on_card(training), training.get("distilled")
-    distilled = plan and msgspec.convert(plan, Distillation)
-    machine = training["machine"]
-    checkpoint = Checkpoint(recipe, initial_network(recipe), {}, machine, distilled=distilled)
+    recipe = recipe_on_card(training)
+    checkpoint = Checkpoint(recipe, initial_network(recipe), {}, training["machine"])
     assert as_json(checkpoint_card(checkpoint).training) == as_json(training)
 
 

@@ -24,7 +24,11 @@ from tests.support.networks import CARD, DEFAULT_CARD
 from train.metrics.card import TO_LIMIT
 from train.metrics.one_step import Improvement
 from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.from_recipe import initial_network, initial_vertex_network
+from train.models.from_recipe import (
+    initial_network,
+    initial_sharpness_network,
+    initial_vertex_network,
+)
 from train.models.networks import BoundedNet, SharpNet
 from train.models.recipes import general, paper
 from train.models.tied import TiedNet
@@ -171,8 +175,9 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
 @pytest.mark.parametrize("recipe", [paper(4), general(4)], ids=["paper", "general"])
 def test_a_card_holds_the_whole_recipe(tmp_path, recipe):
     metrics = {"ridge-held-out": {"distance": {"percent": 12.0}}}
-    network, vertices = initial_network(recipe), initial_vertex_network(recipe)
-    checkpoint = Checkpoint(recipe, network, metrics, "machine", vertices)
+    made = initial_network, initial_vertex_network, initial_sharpness_network
+    network, *others = (initial(recipe) for initial in made)
+    checkpoint = Checkpoint(recipe, network, metrics, "machine", *others)
     exported = export_model(checkpoint, tmp_path / "models" / "mine.onnx")
     model = load_model(tmp_path / "models" / "mine.onnx")
     assert model.hash == exported.sha256

@@ -18,7 +18,6 @@ from train.connectivity import connect
 from train.data.batch import disjoint_union, pairs_sharing_a_face
 from train.data.datasets import DATASETS, ridge_held_out, ridge_training
 from train.fitting.determinism import deterministic, machine_fingerprint
-from train.fitting.limit_loss import squared_chords
 from train.fitting.limit_trainer import ahead
 from train.fitting.quiet import draw_features, quiet_loss, quiet_term, support_of
 from train.fitting.trainer import (
@@ -243,18 +242,3 @@ def test_a_process_that_is_killed_is_missed():
     process.kill()
     with pytest.raises(EOFError):
         list(made)
-
-
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_lengths_and_gradients_have_the_bits_of_torch(order):
-    rng = np.random.default_rng(0)
-    table = np.asarray(rng.standard_normal((50, 3)), order=order)
-    # Many pairs share an end, so that the order of sums shows; some are of one row with itself.
-    ends, weights = rng.integers(0, 50, (400, 2)), torch.from_numpy(rng.standard_normal(400))
-    ours, theirs = (torch.tensor(table, requires_grad=True) for _ in range(2))
-    made = squared_chords(ours, ends)
-    expected = ((theirs[ends[:, 1]] - theirs[ends[:, 0]]) ** 2).sum(dim=1)
-    assert torch.equal(made, expected)
-    (made * weights).sum().backward()
-    (expected * weights).sum().backward()
-    assert torch.equal(ours.grad, theirs.grad)

@@ -1,25 +1,36 @@
-"""What surrounds the networks of a scale-free rule on one mesh: constants while they are trained.
+"""A control mesh with its networks, differentiable in their weights: all that is trained.
 
-    x' = x0 + s γ Π_ρ(D + τ h F z(φ))
+    x₁ = S_w p + s δ     δ = (1 − w) γ Π_ρ(D + τ h F z(φ)) + w Π_ρ(D_c)     D = S_w d
+    x₂ = S_w x₁, with the sharpness that halves of edges inherit; then the smooth scheme
 
-The library measures all but z once; gradients pass through z, with s of the fold guard held.
+Sharpness w is a network's too. The library measures features, frames, gates and pushes once;
+gradients pass through z and w, with the order of weights around vertices and s of the guard held.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sparse
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from pns_common import Mesh, loop, operator
 from pns_common.curves import Curves, find_curves
+from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR
 from pns_common.level import Level
 from pns_common.refinement import control_level
-from train.models.networks import BoundedNet, unit_correction
+from pns_common.sharpness import sharpness_inputs
+from train.connectivity import connect
+from train.curve_rule import curve_push
+from train.data.batch import joined_meshes
+from train.fitting.sharp_masks import Sharpness, around_vertices, of_children, placed
+from train.loop_masks import loop_mask
+from train.models.networks import BoundedNet, Networks, SharpNet, unit_correction
 from train.models.recipe import Recipe, scale_free_parts
-from train.tensors import shortened
+from train.tensors import dot, shortened
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +38,10 @@ class Inputs:
     """What surrounds a network at N new vertices, all but its answers.
 
     Attributes:
-        rows: their numbers in the refined mesh.
+        rows: their numbers among vertices, or among edges.
         features: φ.
         axes: F, or the three vectors of a ring, as columns.
         gate, bound, reach: γ, ρ and τ h.
-        prior: D.
     """
 
     rows: Int[Tensor, " N"]
@@ -40,50 +50,120 @@ class Inputs:
     gate: Float[Tensor, " N"]
     bound: Float[Tensor, " N"]
     reach: Float[Tensor, " N"]
-    prior: Float[Tensor, "N 3"]
 
-    def displacement(self, network: BoundedNet) -> Float[Tensor, "N 3"]:
-        """Return δ = γ Π_ρ(D + τ h F z(φ))."""
+    def corrected(
+        self, network: BoundedNet, prior: Float[Tensor, "M 3"], gate: Float[Tensor, " N"]
+    ) -> Float[Tensor, "M 3"]:
+        """Return γ Π_ρ(D + τ h F z(φ)) at all M vertices or edges; 0 beside these rows."""
         z = unit_correction(network)(self.features)
-        wanted = self.prior + self.reach[:, None] * (self.axes @ z[:, :, None])[:, :, 0]
-        return self.gate[:, None] * shortened(wanted, self.bound)
+        wanted = prior[self.rows] + self.reach[:, None] * (self.axes @ z[:, :, None])[:, :, 0]
+        made = gate[:, None] * shortened(wanted, self.bound)
+        return torch.zeros_like(prior).index_add(0, self.rows, made)
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedLevel:
-    """A control mesh before its learned level.
+    """A control mesh and the two levels at which it has sharp edges.
 
     Attributes:
         level, curves: the library's, for its fold guard.
-        base: x0, old vertices first.
-        on_curves: what is added at boundaries, whatever the networks answer.
-        edges, vertices: what surrounds both networks.
-        pushed: x0 with the whole prior: quasi-interpolation along the normal.
-        fold_angle: θ, radians.
+        points, edges: of the control mesh; `split_edges` of the mesh after one level.
+        halves: the edge that each of those is half of, −1 for none.
+        smooth, smooth_split: the scheme's smooth rules at both levels.
+        on_boundary: edges that are sharp for good.
+        interior: the others, by row; psi, cap: their features and the most that w can be.
+        jumps, face_edges, sides: x, edges of faces, and both faces of the edges of `at_edges`.
+        degenerate: which of those have no frame.
+        at_edges, at_vertices: what surrounds both networks; γ of edges is their own part.
+        push: d of vertices away from curves.
+        rule: the library's, for its numbers.
     """
 
     level: Level
     curves: Curves
-    base: Float[Tensor, "W 3"]
-    on_curves: Float[Tensor, "W 3"]
-    edges: Inputs
-    vertices: Inputs
-    pushed: Float[Tensor, "W 3"]
-    fold_angle: float
+    points: Float[Tensor, "V 3"]
+    edges: Int[Tensor, "E 2"]
+    split_edges: Int[Tensor, "E1 2"]
+    halves: Int[Tensor, " E1"]
+    smooth: sparse.csr_array
+    smooth_split: sparse.csr_array
+    on_boundary: Bool[Tensor, " E"]
+    interior: Int[Tensor, " I"]
+    psi: Float[Tensor, "I P"]
+    cap: Float[Tensor, " I"]
+    jumps: Float[Tensor, " E"]
+    face_edges: Int[Tensor, "F 3"]
+    sides: Int[Tensor, "N 2"]
+    degenerate: Bool[Tensor, " N"]
+    at_edges: Inputs
+    at_vertices: Inputs
+    push: Float[Tensor, "V 3"]
+    numbers: dict[str, float]
 
-    def points(self, network: BoundedNet, vertex_network: BoundedNet) -> Float[Tensor, "W 3"]:
-        """Return x', with gradients to both networks."""
-        made = self.on_curves
-        for part, net in ((self.edges, network), (self.vertices, vertex_network)):
-            made = made.index_add(0, part.rows, part.displacement(net))
+    def logits(self, network: SharpNet) -> Float[Tensor, " I"]:
+        """Return the answers of the sharpness network before the sigmoid."""
+        own = network.linear_layers[0].weight.dtype
+        return network(self.psi.to(own))[:, 0].double()
+
+    def sharpness(self, logits: Float[Tensor, " I"]) -> Sharpness:
+        """Return w: 1 at boundaries."""
+        w = self.on_boundary.double().index_put((self.interior,), self.cap * torch.sigmoid(logits))
+        return around_vertices(self.edges, w, len(self.points))
+
+    def smooth_sharpness(self) -> Sharpness:
+        """Return w of a mesh without sharp edges but its boundary."""
+        return around_vertices(self.edges, self.on_boundary.double(), len(self.points))
+
+    def first(self, sharp: Sharpness, networks: Networks | None) -> Float[Tensor, "W 3"]:
+        """Return x₁; without networks that of the base scheme, with sharp edges."""
+        base = placed(self.smooth, sharp, self.edges, self.points)
+        if networks is None:
+            return base
+        delta = self.displacement(sharp, networks)
         scale = operator.guard_scale(
-            self.level, self.base.numpy(), made.detach().numpy(), self.fold_angle, self.curves
+            self.level,
+            base.detach().numpy(),
+            delta.detach().numpy(),
+            self.numbers["fold_angle"],
+            self.curves,
         )
-        return self.base + torch.from_numpy(scale)[:, None] * made
+        return base + torch.from_numpy(scale)[:, None] * delta
+
+    def displacement(self, sharp: Sharpness, networks: Networks) -> Float[Tensor, "W 3"]:
+        """Return δ."""
+        n, count = self.numbers, len(self.points)
+        second, curved = sharp.second, (sharp.second - sharp.third)[:, None]
+        a, b = (self.points[sharp.ends[:, k]] - self.points for k in (0, 1))
+        along = n["curve"] * curved * curve_push(a, b, n["vertex_gate"])
+        push = n["strength"] * (1 - second)[:, None] * self.push + along
+        prior = placed(self.smooth, sharp, self.edges, push)
+        ends = along[sharp.ends].sum(dim=1)
+        squares = (dot(a, a) + dot(b, b)) / 2
+        on_curve = shortened(CURVE_CENTRE * along + CURVE_NEIGHBOUR * ends, n["budget"] * squares)
+        vertices = self.at_vertices.corrected(
+            networks.vertex,
+            prior[:count],
+            (1 - second[self.at_vertices.rows]) * self.at_vertices.gate,
+        )
+        between = self.points[self.edges]
+        length = between[:, 1] - between[:, 0]
+        middle = shortened(along[self.edges].mean(dim=1), n["budget"] * dot(length, length))
+        w = sharp.edge
+        smoothed = (self.jumps * (1 - w))[self.face_edges].mean(dim=1)[self.sides].amin(dim=1)
+        opened = torch.where(self.degenerate, 0.0, torch.tanh(n["vertex_gate"] * smoothed))
+        own = self.at_edges.gate
+        gate = (1 - w[self.at_edges.rows]) * (own + (1 - own) * opened)
+        edges = self.at_edges.corrected(networks.edge, prior[count : count + len(w)], gate)
+        return torch.cat([vertices + curved * on_curve, edges + w[:, None] * middle])
+
+    def second(self, sharp: Sharpness, first: Float[Tensor, "W 3"]) -> Float[Tensor, "M 3"]:
+        """Return x₂ of x₁."""
+        inherited = of_children(sharp, self.edges, self.halves, len(first))
+        return placed(self.smooth_split, inherited, self.split_edges, first)
 
 
-def learned_level(mesh: Mesh, recipe: Recipe) -> LearnedLevel:
-    """Measure a mesh at reference length 1, with the prior's strength of training.
+def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
+    """Measure a union of meshes, each of reference length 1.
 
     Raises:
         ParameterError: the recipe is not scale-free.
@@ -97,44 +177,67 @@ def learned_level(mesh: Mesh, recipe: Recipe) -> LearnedLevel:
         budget=recipe.budget,
         vertex_network=_not_asked,
         vertex_gate_sharpness=vertex_rule.gate_sharpness,
-        prior_strength=strength,
-        curve_strength=form.boundary_strength,
+        prior_strength=None,
         network_scale=form.network_scale,
-        fold_angle=form.fold_angle,
     )
+    unit_prior = operator.Rule(**{**vars(rule), "prior_strength": 1.0})
+    mesh = joined_meshes(meshes)
     level = control_level(mesh, loop(), 1.0, None, threads=1)
-    topology, count = level.topology, len(mesh.vertices)
-    curves = find_curves(level.points, topology)
-    prior = torch.from_numpy(operator.prior(level, rule, curves))
-    base = level.base.place(level.points, topology, level.blocks)
-    pushed = base + level.base.place(
-        operator.pushes(level, rule) / strength, topology, level.blocks
-    )
-    on_curves, rows = torch.zeros_like(prior), torch.from_numpy(curves.new_rows)
-    bound = recipe.budget * torch.from_numpy(curves.squares)
-    on_curves[rows] = shortened(prior[rows], bound)
-    edges = operator.edge_inputs(level, rule, topology.interior)
-    vertices = operator.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
-    # Without what was measured: this travels between processes.
-    bare = Level(level.points, topology, level.base, 1.0, level.blocks)
+    topology = level.topology
+    edges = topology.edges.astype(np.int64)
+    at_edges = operator.edge_inputs(level, rule, topology.interior)
+    at_vertices = operator.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
+    psi, cap = _psi(meshes, vertex_rule.gate_sharpness)
+    control = connect(mesh.faces, len(mesh.vertices))
+    assert np.array_equal(control.edges.numpy(), edges)
+    split = connect(control.split().numpy(), len(mesh.vertices) + len(edges))
+    low, high = split.edges.T
+    made = high - len(mesh.vertices)
+    is_half = (low < len(mesh.vertices)) & (made >= 0)
     return LearnedLevel(
-        level=bare,
-        curves=curves,
-        base=torch.from_numpy(base),
-        on_curves=on_curves,
-        edges=_inputs(edges, count, prior),
-        vertices=_inputs(vertices, 0, prior),
-        pushed=torch.from_numpy(pushed),
-        fold_angle=math.radians(form.fold_angle),
+        # Without what was measured: this travels between processes.
+        level=Level(level.points, topology, level.base, 1.0, level.blocks),
+        curves=find_curves(level.points, topology),
+        points=torch.from_numpy(np.array(level.points)),
+        edges=torch.from_numpy(edges),
+        split_edges=split.edges,
+        halves=torch.where(is_half, made, -1),
+        smooth=loop_mask(control).matrix(),
+        smooth_split=loop_mask(split).matrix(),
+        on_boundary=~control.paired,
+        interior=torch.from_numpy(topology.interior.astype(np.int64)),
+        psi=torch.from_numpy(psi),
+        cap=torch.from_numpy(cap),
+        jumps=torch.from_numpy(level.edges.jumps),
+        face_edges=torch.from_numpy(topology.face_edges.astype(np.int64)),
+        sides=torch.from_numpy(topology.half_edges[at_edges.rows].astype(np.int64) // 3),
+        degenerate=torch.from_numpy(at_edges.degenerate),
+        at_edges=_inputs(at_edges),
+        at_vertices=_inputs(at_vertices),
+        push=torch.from_numpy(operator.pushes(level, unit_prior)),
+        numbers={
+            "budget": recipe.budget,
+            "strength": strength,
+            "curve": form.boundary_strength,
+            "vertex_gate": vertex_rule.gate_sharpness,
+            "fold_angle": math.radians(form.fold_angle),
+        },
     )
 
 
-def _inputs(at: operator.Inputs, first: int, prior: Float[Tensor, "W 3"]) -> Inputs:
-    rows = torch.from_numpy(first + at.rows.astype(np.int64))
-    gate = torch.from_numpy(at.weight * at.gate)
+def _psi(meshes: Sequence[Mesh], gate_sharpness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return features and caps of sharpness; some features are those of a whole mesh."""
+    levels = [control_level(mesh, loop(), 1.0, None, threads=1) for mesh in meshes]
+    made = [sharpness_inputs(level, gate_sharpness)[1:] for level in levels]
+    psi, cap = zip(*made, strict=True)
+    return np.concatenate(psi), np.concatenate(cap)
+
+
+def _inputs(at: operator.Inputs) -> Inputs:
+    rows, gate = torch.from_numpy(at.rows.astype(np.int64)), torch.from_numpy(at.gate)
     axes = torch.from_numpy(at.basis).reshape(-1, 3, 3).transpose(1, 2)
     bound, reach = torch.from_numpy(at.bound), torch.from_numpy(at.reach)
-    return Inputs(rows, torch.from_numpy(at.features), axes, gate, bound, reach, prior[rows])
+    return Inputs(rows, torch.from_numpy(at.features), axes, gate, bound, reach)
 
 
 def _not_asked(features: np.ndarray) -> np.ndarray:

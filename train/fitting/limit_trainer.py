@@ -10,15 +10,17 @@ from typing import TypeVar
 
 import numpy as np
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.references import Pair
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
-from train.fitting.limit_loss import LimitMeasures, Standards, limit_loss, measure
-from train.models.from_recipe import initial_network, initial_vertex_network
-from train.models.networks import BoundedNet
-from train.models.recipe import Recipe, ToLimit, scale_free_parts
+from train.fitting.limit_loss import LimitMeasures, limit_loss, measure, sharpness_loss
+from train.models.from_recipe import initial_networks
+from train.models.networks import Networks
+from train.models.recipe import Recipe, ToLimit
 
 # Share of the steps in which the learning rate rises.
 WARM_UP = 0.1
@@ -28,21 +30,26 @@ LONGEST_GRADIENT = 1.0
 
 def fit_to_limit(
     recipe: Recipe, plan: ToLimit, on_step: Callable[[int, float], None]
-) -> tuple[BoundedNet, BoundedNet, tuple[float, ...]]:
-    """Return the trained networks of a scale-free recipe, and the loss before each step."""
+) -> tuple[Networks, tuple[float, ...]]:
+    """Return the trained networks of a scale-free recipe, and the loss before each step.
+
+    Sharpness alone is trained first, against the truth; then all three networks on the limit.
+    """
     with deterministic():
-        network, vertex_network = initial_network(recipe), initial_vertex_network(recipe)
-        scale_free_parts(recipe)
-        assert vertex_network is not None  # a scale-free recipe has one
-        weights = [*network.parameters(), *vertex_network.parameters()]
+        networks = initial_networks(recipe)
+        weights = list(networks.parameters())
         optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP
         )
         losses: list[float] = []
-        for batch, standards in _batches(recipe, plan):
-            measures = limit_measures(batch, network, vertex_network)
-            loss = limit_loss(plan.weights, batch, measures, standards)
+        for batch, reference in _batches(recipe, plan):
+            logits = batch.level.logits(networks.sharp)
+            loss = plan.weights.sharp * sharpness_loss(batch, logits)
+            if len(losses) >= plan.start:
+                loss = loss + limit_loss(
+                    plan.weights, limit_measures(batch, networks, logits), reference
+                )
             optimiser.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(weights, LONGEST_GRADIENT)
@@ -50,32 +57,34 @@ def fit_to_limit(
             schedule.step()
             losses.append(loss.item())
             on_step(len(losses), losses[-1])
-    return network, vertex_network, tuple(losses)
+    return networks, tuple(losses)
 
 
 def limit_measures(
-    batch: LimitBatch, network: BoundedNet, vertex_network: BoundedNet
+    batch: LimitBatch, networks: Networks, logits: Float[Tensor, " I"]
 ) -> LimitMeasures:
-    """Take the learned level, and measure the limit of Loop after it."""
-    return measure(batch, batch.level.points(network, vertex_network))
+    """Take the learned level, the next one, and measure the limit of the base scheme after them."""
+    sharp = batch.level.sharpness(logits)
+    return measure(batch, batch.level.second(sharp, batch.level.first(sharp, networks)))
 
 
-def standards_of(batch: LimitBatch) -> Standards:
-    """Return Loop's measures on a batch, and those of quasi-interpolation along the normal."""
+def reference_of(batch: LimitBatch) -> LimitMeasures:
+    """Return the base scheme's measures on a batch."""
     with torch.no_grad():
-        return Standards(measure(batch, batch.level.base), measure(batch, batch.level.pushed))
+        smooth = batch.level.smooth_sharpness()
+        return measure(batch, batch.level.second(smooth, batch.level.first(smooth, None)))
 
 
-def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, Standards]]:
+def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     """Yield one batch a step, drawn from a pool that grows until its oldest give way to new ones.
 
     Making a batch takes as long as some ten steps on it, so another process makes the next one.
     """
-    pool: list[tuple[LimitBatch, Standards]] = []
+    pool: list[tuple[LimitBatch, LimitMeasures]] = []
     # A process takes as long to start as a batch: one batch is made here.
     several = recipe.steps > plan.reuse
     for draw in ahead(_draws, recipe, plan) if several else _draws(recipe, plan):
-        pool = [*pool, (draw.batch, draw.standards)][-plan.pool :]
+        pool = [*pool, (draw.batch, draw.reference)][-plan.pool :]
         for place in draw.places:
             yield pool[place]
 
@@ -85,7 +94,7 @@ class _Draw:
     """A new batch of a pool, and the places in the pool that the steps after it take."""
 
     batch: LimitBatch
-    standards: Standards
+    reference: LimitMeasures
     places: list[int]
 
 
@@ -94,22 +103,22 @@ def _draws(recipe: Recipe, plan: ToLimit) -> Iterator[_Draw]:
     with deterministic():
         fresh = _fresh(recipe, plan, rng)
         for number, first in enumerate(range(0, recipe.steps, plan.reuse), start=1):
-            batch, standards = next(fresh)
+            batch, reference = next(fresh)
             steps = min(plan.reuse, recipe.steps - first)
             places = rng.integers(min(number, plan.pool), size=steps)
-            yield _Draw(batch, standards, places.tolist())
+            yield _Draw(batch, reference, places.tolist())
 
 
 def _fresh(
     recipe: Recipe, plan: ToLimit, rng: np.random.Generator
-) -> Iterator[tuple[LimitBatch, Standards]]:
+) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     waiting: list[Pair] = []
     for pair in pair_stream(recipe.seed):
         waiting.append(pair)
         if sum(len(mesh_pair.coarse.faces) for mesh_pair in waiting) >= plan.faces:
             batch = limit_batch(waiting, recipe, rng)
             waiting = []
-            yield batch, standards_of(batch)
+            yield batch, reference_of(batch)
 
 
 T = TypeVar("T")

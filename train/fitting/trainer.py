@@ -14,7 +14,7 @@ from train.fitting.determinism import deterministic
 from train.fitting.limit_trainer import fit_to_limit
 from train.fitting.quiet import quiet_term
 from train.models.from_recipe import initial_network, paper_rule
-from train.models.networks import BoundedNet
+from train.models.networks import BoundedNet, SharpNet
 from train.models.recipe import LossWeights, OneStep, Recipe, ToLimit, one_step
 from train.reference import Step
 from train.surfaces.implicit import signed_distance, unit_normal
@@ -30,20 +30,21 @@ Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 class Fit:
     """Trained float32 networks and the loss before each step.
 
-    `vertex_network` is None where the recipe has no vertex rule.
+    `vertex_network` and `sharpness_network` are None where the recipe has none.
     """
 
     network: BoundedNet
     losses: tuple[float, ...]
     vertex_network: BoundedNet | None = None
+    sharpness_network: SharpNet | None = None
 
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
     """Train the operator with Adam, on what the recipe says."""
     match recipe.training:
         case ToLimit() as plan:
-            network, vertex_network, losses = fit_to_limit(recipe, plan, on_step)
-            return Fit(network, losses, vertex_network)
+            made, losses = fit_to_limit(recipe, plan, on_step)
+            return Fit(made.edge, losses, made.vertex, made.sharp)
         case OneStep():
             quiet = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
             return optimise(recipe, quiet, on_step)

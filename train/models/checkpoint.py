@@ -1,6 +1,7 @@
 """Checkpoints: weights as safetensors, everything else as JSON in the same file. No pickle.
 
-The vertex network's weights, where there is one, are named with the prefix `vertex.`.
+The weights of the vertex network and of the sharpness network, where there are, are named with the
+prefixes `vertex.` and `sharpness.`.
 """
 
 from dataclasses import dataclass
@@ -14,27 +15,16 @@ from torch import Tensor
 
 from pns_common import ModelError
 from pns_common.files import replace_file
-from train.models.from_recipe import initial_network, initial_vertex_network
-from train.models.networks import BoundedNet
+from train.models.from_recipe import (
+    initial_network,
+    initial_sharpness_network,
+    initial_vertex_network,
+)
+from train.models.networks import BoundedNet, SharpNet
 from train.models.recipe import Recipe
 
 METADATA_KEY = "pns"
-VERTEX = "vertex."
-
-
-@dataclass(frozen=True, slots=True)
-class Distillation:
-    """Record of how networks were fitted to the answers of others.
-
-    Attributes:
-        teachers: hashes of the models whose mean answer they learned.
-        meshes: pairs of the training stream on whose meshes they were asked.
-        steps: Adam steps of the edge network, and of the vertex network.
-    """
-
-    teachers: tuple[str, ...]
-    meshes: int
-    steps: tuple[int, int]
+PREFIXES = ("vertex.", "sharpness.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +37,7 @@ class Checkpoint:
         metrics: held-out results, as on the model card.
         machine: fingerprint of the machine that trained it; elsewhere the last bits may differ.
         vertex_network: float32, where the recipe has a vertex rule.
-        distilled: where the weights were fitted to answers of other models.
+        sharpness_network: float32, where the recipe has one.
     """
 
     recipe: Recipe
@@ -55,7 +45,7 @@ class Checkpoint:
     metrics: dict[str, Any]
     machine: str
     vertex_network: BoundedNet | None = None
-    distilled: Distillation | None = None
+    sharpness_network: SharpNet | None = None
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -64,10 +54,9 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "recipe": checkpoint.recipe,
         "metrics": checkpoint.metrics,
         "machine": checkpoint.machine,
-        "distilled": checkpoint.distilled,
     }
     data = safetensors.torch.save(
-        joined_state(checkpoint.network, checkpoint.vertex_network),
+        joined_state(checkpoint.network, checkpoint.vertex_network, checkpoint.sharpness_network),
         {METADATA_KEY: msgspec.json.encode(facts).decode()},
     )
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,26 +77,28 @@ def load_checkpoint(path: Path) -> Checkpoint:
             state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts = msgspec.json.decode(metadata[METADATA_KEY], type=_Facts)
         network = initial_network(facts.recipe)
-        vertex_network = initial_vertex_network(facts.recipe)
-        own = {name: tensor for name, tensor in state.items() if not name.startswith(VERTEX)}
-        network.load_state_dict(own)
-        if vertex_network is not None:
-            extra = {name.removeprefix(VERTEX): state[name] for name in state if name not in own}
-            vertex_network.load_state_dict(extra)
+        extra = initial_vertex_network(facts.recipe), initial_sharpness_network(facts.recipe)
+        for prefix, part in zip(PREFIXES, extra, strict=True):
+            if part is not None:
+                names = [name for name in state if name.startswith(prefix)]
+                part.load_state_dict({n.removeprefix(prefix): state.pop(n) for n in names})
+        network.load_state_dict(state)
     except (SafetensorError, KeyError, msgspec.MsgspecError, RuntimeError) as error:
         raise ModelError(
             str(path), expected="safetensors with a recipe and its weights", found=str(error)
         ) from error
-    return Checkpoint(
-        facts.recipe, network, facts.metrics, facts.machine, vertex_network, facts.distilled
-    )
+    vertex, sharpness = extra
+    return Checkpoint(facts.recipe, network, facts.metrics, facts.machine, vertex, sharpness)
 
 
-def joined_state(network: BoundedNet, vertex_network: BoundedNet | None) -> dict[str, Tensor]:
-    """Return the weights of both networks under names of their own."""
+def joined_state(
+    network: BoundedNet, vertex_network: BoundedNet | None, sharpness_network: SharpNet | None
+) -> dict[str, Tensor]:
+    """Return the weights of all networks under names of their own."""
     state = dict(network.state_dict())
-    if vertex_network is not None:
-        state |= {f"{VERTEX}{name}": w for name, w in vertex_network.state_dict().items()}
+    for prefix, part in zip(PREFIXES, (vertex_network, sharpness_network), strict=True):
+        if part is not None:
+            state |= {f"{prefix}{name}": w for name, w in part.state_dict().items()}
     return state
 
 
@@ -115,4 +106,3 @@ class _Facts(msgspec.Struct, forbid_unknown_fields=True):
     recipe: Recipe
     metrics: dict[str, Any]
     machine: str
-    distilled: Distillation | None = None

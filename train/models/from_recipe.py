@@ -8,7 +8,14 @@ import torch
 
 from pns_common import ParameterError
 from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, FeatureSet
-from train.models.networks import INPUT_COUNT, BoundedNet, SymmetricNet, unit_correction
+from train.models.networks import (
+    INPUT_COUNT,
+    BoundedNet,
+    Networks,
+    SharpNet,
+    SymmetricNet,
+    unit_correction,
+)
 from train.models.recipe import Recipe, scale_free_parts
 from train.models.tied import TiedNet
 from train.reference import EDGE_FEATURES, GeneralRule, PaperRule
@@ -34,8 +41,8 @@ FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
     }
 )
 
-# The vertex network's draw is not the edge network's.
-VERTEX_SEED = 1 << 20
+# Each network has a draw of its own.
+VERTEX_SEED, SHARP_SEED = 1 << 20, 1 << 21
 
 
 def initial_network(recipe: Recipe) -> BoundedNet:
@@ -54,6 +61,27 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
     generator = torch.Generator().manual_seed(VERTEX_SEED + recipe.seed)
     seen = RING_FEATURE_SETS[recipe.vertex.features]
     return _keeping_symmetry(recipe, seen, recipe.vertex.hidden, generator)
+
+
+def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
+    """Return the untrained sharpness network of a recipe; None where it has none."""
+    seen = recipe.sharpness
+    if seen is None:
+        return None
+    generator = torch.Generator().manual_seed(SHARP_SEED + recipe.seed)
+    return SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+
+
+def initial_networks(recipe: Recipe) -> Networks:
+    """Return the untrained networks of a scale-free recipe.
+
+    Raises:
+        ParameterError: it has no vertex rule, or no sharpness network.
+    """
+    vertex, sharp = initial_vertex_network(recipe), initial_sharpness_network(recipe)
+    if vertex is None or sharp is None:
+        raise ParameterError("recipe", recipe.name, expected="three networks")
+    return Networks(initial_network(recipe), vertex, sharp)
 
 
 def _keeping_symmetry(

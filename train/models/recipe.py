@@ -23,29 +23,18 @@ class LimitWeights:
 
     Attributes:
         mean, spread, peak: distance: its mean, its root mean square, its soft maximum.
-        normal, normal_spread: normals: mean and root mean square.
+        normal: mean difference of normals.
         worse: beside each of these, what is above `worse_from` of Loop's.
-        bend: logarithm of bending over the prior's own (of authored meshes, over Loop's).
-        sharp: the same above `sharp_bend`, of surfaces that may have edges.
-        ripples: above `smooth_bend` on smooth surfaces, above `authored_bend` on authored meshes.
-        jump: logarithm of the largest turn over Loop's, above `allowed_jump`.
+        sharp: cross entropy of sharpness and truth.
     """
 
     mean: float
     spread: float
     peak: float
     normal: float
-    normal_spread: float
     worse: float
     worse_from: float
-    bend: float
     sharp: float
-    sharp_bend: float
-    ripples: float
-    smooth_bend: float
-    authored_bend: float
-    jump: float
-    allowed_jump: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +47,24 @@ class VertexRule:
 
 
 @dataclass(frozen=True, slots=True)
+class SharpnessRule:
+    """The sharpness network: its features and hidden widths."""
+
+    features: str
+    hidden: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ScaleFree:
     """What makes a recipe's rule scale-free (format 4), as on the card.
 
     Attributes:
         base: the base scheme, "loop" or "catmull-clark".
-        prior_strength: s, in use; training has a strength of its own.
+        prior_strength: s.
         boundary_strength: of the prior along boundary and crease curves.
         network_scale: τ, in edge lengths.
         fold_angle: θ, degrees.
-        sharpness_levels: at how many levels sharp edges stay sharp, in use; training sees none.
+        sharpness_levels: at how many levels sharp edges stay sharp; training takes two.
     """
 
     base: str
@@ -108,7 +105,8 @@ class ToLimit(msgspec.Struct, frozen=True, tag=True):
         faces: coarse faces in a batch, about.
         pool: batches kept to draw from, at most.
         reuse: after every so many steps a new batch comes in, in the end for the oldest.
-        trained_strength: s of the prior while the network is trained; in use it is the form's.
+        trained_strength: s of the prior while the networks are trained; in use it is the form's.
+        start: steps at the beginning in which sharpness alone is trained, against the truth.
     """
 
     weights: LimitWeights
@@ -116,6 +114,7 @@ class ToLimit(msgspec.Struct, frozen=True, tag=True):
     pool: int
     reuse: int
     trained_strength: float
+    start: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +134,7 @@ class Recipe:
         orientation: as on the model card; "symmetric" keeps the stencil's symmetries.
         vertex: the learned rule for old vertices; None leaves them to Loop.
         scale_free: the rule of format 4; None is the paper's.
+        sharpness: its sharpness network.
     """
 
     name: str
@@ -150,6 +150,7 @@ class Recipe:
     orientation: str = "first-face"
     vertex: VertexRule | None = None
     scale_free: ScaleFree | None = None
+    sharpness: SharpnessRule | None = None
 
 
 def one_step(recipe: Recipe) -> OneStep:

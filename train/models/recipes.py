@@ -12,6 +12,7 @@ from train.models.recipe import (
     OneStep,
     Recipe,
     ScaleFree,
+    SharpnessRule,
     ToLimit,
     VertexRule,
     one_step,
@@ -87,7 +88,7 @@ def general(seed: int = 0) -> Recipe:
     """Return the default model's recipe: any mesh, at any scale, corrected once.
 
     It starts from quasi-interpolation along the normal (s = 1), which a network of zeros leaves as
-    it is; in use s is 0.92, since vertices of simplified meshes lie outside a little already.
+    it is; in use s is 0.85, since vertices of simplified meshes lie outside a little already.
     C = 10 leaves room for all that is right on meshes as coarse as a cube; what must not happen
     there, the fold guard prevents. The gates open where faces are bent by two hundredths of a
     radian, so that fine meshes gain as well.
@@ -101,40 +102,28 @@ def general(seed: int = 0) -> Recipe:
         gate_sharpness=1e7,
         training=ToLimit(
             weights=LimitWeights(
-                mean=1.0,
-                spread=0.3,
-                peak=0.7,
-                normal=3.0,
-                normal_spread=1.0,
-                worse=1.5,
-                worse_from=0.95,
-                bend=0.1,
-                sharp=1.0,
-                sharp_bend=1.4,
-                ripples=3.0,
-                smooth_bend=1.0,
-                authored_bend=1.1,
-                jump=0.5,
-                allowed_jump=0.15,
+                mean=1.0, spread=0.5, peak=0.7, normal=3.0, worse=1.5, worse_from=0.95, sharp=0.5
             ),
-            faces=700,
-            pool=40,
+            faces=600,
+            pool=80,
             reuse=40,
             trained_strength=1.0,
+            start=300,
         ),
-        steps=8000,
+        steps=5000,
         learning_rate=2.5e-3,
         seed=seed,
         orientation="symmetric",
         vertex=VertexRule("ring-10", hidden=(32, 32), gate_sharpness=1e4),
         scale_free=ScaleFree(
             base="loop",
-            prior_strength=0.92,
+            prior_strength=0.85,
             boundary_strength=1.0,
             network_scale=0.4,
-            fold_angle=75.0,
+            fold_angle=40.0,
             sharpness_levels=2,
         ),
+        sharpness=SharpnessRule("crease-53", hidden=(32, 32)),
     )
 
 

@@ -32,7 +32,7 @@ class TorchModel:
     @property
     def hash(self) -> str:
         """The sha256 of the weights."""
-        weights = joined_state(self.network, self.vertex_network)
+        weights = joined_state(self.network, self.vertex_network, self.sharpness_network)
         return hashlib.sha256(safetensors.torch.save(weights)).hexdigest()
 
     def __call__(
@@ -76,10 +76,13 @@ def _answer(
 
 
 def recipe_model(
-    recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet | None = None
+    recipe: Recipe,
+    network: BoundedNet,
+    vertex_network: BoundedNet | None = None,
+    sharpness_network: SharpNet | None = None,
 ) -> TorchModel:
     """Return a recipe's networks as a model whose card has no metrics yet."""
-    rule, form = recipe.vertex, recipe.scale_free
+    rule, form, sharpness = recipe.vertex, recipe.scale_free, recipe.sharpness
     card = ModelCard(
         format=PAPER_FORMAT if form is None else DEFAULT_FORMAT,
         features=recipe.features,
@@ -90,6 +93,7 @@ def recipe_model(
         metrics={},
         vertex_features=None if rule is None else rule.features,
         vertex_gate_sharpness=None if rule is None else rule.gate_sharpness,
+        sharpness_features=None if sharpness is None else sharpness.features,
         **({} if form is None else asdict(form)),
     )
-    return TorchModel(recipe.name, card, network, vertex_network)
+    return TorchModel(recipe.name, card, network, vertex_network, sharpness_network)

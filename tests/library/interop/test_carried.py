@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
-from pns_common import Creases, Mesh, ParameterError, loop, refine
-from pns_common.interop.carried import CarriedMesh, between, join_by_position, refine_carried
+from pns_common import Creases, Mesh, ParameterError, loop, refine, subdivide
+from pns_common.interop.carried import (
+    CarriedMesh,
+    between,
+    join_by_position,
+    quad_corners,
+    refine_carried,
+)
 from tests.support.meshes import bumpy_sphere, grid
+from tests.support.polygons import mixed_cube
 
 
 def seamed(vertices, faces):
@@ -116,3 +123,21 @@ def test_by_index_vertices_in_one_place_stay_apart_and_keep_their_numbers():
         assert len(made.vertices) == 12
     with pytest.raises(ParameterError, match="weld"):
         refine_carried(mesh, loop(), 1, {"weld": "off"})
+
+
+def test_corners_of_polygons_follow_the_split():
+    """Each quad's corners: the old one, both edges' middles and the face's mean, in its order."""
+    points, faces = mixed_cube()
+    mesh = Mesh(points, faces)
+    values = points[mesh.corners]  # a position as data of corners
+    made = quad_corners(values, mesh.topology())
+    # Where all edges are sharp, the base scheme puts their vertices into the middle.
+    sharp = refine(mesh, "catmull-clark", 1, creases=mesh.topology().edges.astype(np.int64)).mesh
+    np.testing.assert_allclose(made[:, 0], values)
+    np.testing.assert_allclose(made[:, 1:], sharp.vertices[sharp.faces][:, 1:])
+
+
+def test_a_library_of_triangles_refuses_quads():
+    trimesh = pytest.importorskip("trimesh")
+    with pytest.raises(ParameterError, match="holds no quads"):
+        subdivide(trimesh.creation.box(), 1, "catmull-clark")

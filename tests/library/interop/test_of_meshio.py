@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pns_common import MeshError, subdivide
+from pns_common import Mesh, MeshError, load_model, pns, refine, subdivide
+from tests.support.polygons import mixed_cube
 from tests.support.split_data import FACES, SCHEME, UV, VERTICES, same_surface, split_uv
 
 
@@ -45,10 +46,36 @@ class TestMeshio:
         given = self.meshio.Mesh(np.array([[0.0, 0], [1, 0], [0, 1]]), [("triangle", [[0, 1, 2]])])
         assert subdivide(given, 2).points.shape == (15, 2)
 
-    @pytest.mark.parametrize("cells", [[("quad", [[0, 1, 2, 3]])], []])
+    @pytest.mark.parametrize("cells", [[("tetra", [[0, 1, 2, 3]])], []])
     def test_other_cells_are_refused_by_name(self, cells):
-        with pytest.raises(MeshError, match=r"cells of type (quad|none)"):
+        with pytest.raises(MeshError, match=r"cells of type (tetra|none)"):
             subdivide(self.meshio.Mesh(np.eye(4)[:, :3], cells))
+
+    def test_mixed_cells_become_quads_with_their_data(self):
+        points, faces = mixed_cube()
+        quads, triangles = ([f for f in faces if len(f) == degree] for degree in (4, 3))
+        given = self.meshio.Mesh(
+            points,
+            [("quad", quads), ("triangle", triangles)],
+            point_data={"height": points[:, 2]},
+            cell_data={"part": [np.arange(5.0), np.array([7.0, 8])]},
+            cell_sets={"first": [[0], [0]]},
+        )
+        refined = subdivide(given, 2)
+        assert [block.type for block in refined.cells] == ["quad", "quad"]
+        assert [len(block.data) for block in refined.cells] == [5 * 16, 2 * 12]
+        np.testing.assert_array_equal(refined.cell_data["part"][1], np.repeat([7.0, 8], 12))
+        assert [part.tolist() for part in refined.cell_sets["first"]] == [
+            list(range(16)),
+            list(range(12)),
+        ]
+        expected = refine(Mesh(points, [*quads, *triangles]), pns(load_model()), 2).mesh
+        np.testing.assert_allclose(refined.points, expected.vertices)
+        # Linear on each face of the control mesh, where heights are those of its plane.
+        columns = {"h": points[:, 0]}
+        flat = subdivide(self.meshio.Mesh(points, [("quad", quads)], point_data=columns), 1)
+        np.testing.assert_allclose(flat.point_data["h"][: len(points)], points[:, 0])
+        assert flat.point_data["h"][-5:].tolist() == [points[f, 0].mean() for f in quads]
 
     def test_quads_and_polygons_are_cut_with_their_data(self):
         blocks = [("quad", [[3, 2, 1, 0]]), ("triangle", [[0, 1, 2]])]

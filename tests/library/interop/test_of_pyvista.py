@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pns_common import MeshError, loop, subdivide
+from pns_common import Mesh, MeshError, catmull_clark, loop, refine, subdivide
+from tests.support.polygons import cylinder
 from tests.support.split_data import FACES, SCHEME, UV, VERTICES, same_surface, split_uv
 
 
@@ -37,9 +38,23 @@ class TestPyvista:
         assert "Normals" not in refined.point_data
         assert "Normals" not in refined.cell_data
 
-    def test_a_plane_of_quadrangles_is_refused_with_what_to_do(self):
-        with pytest.raises(MeshError, match="triangulate"):
-            subdivide(self.pyvista.Plane())
+    def test_a_plane_of_quadrangles_becomes_quads_with_its_data(self):
+        plane = self.pyvista.Plane(i_resolution=3, j_resolution=2)
+        plane.point_data["x"] = plane.points[:, 0]
+        plane.cell_data["cell"] = np.arange(6)
+        refined = subdivide(plane, 2)
+        assert refined.regular_faces.shape == (6 * 16, 4)
+        assert refined.cell_data["cell"].tolist() == np.repeat(np.arange(6), 16).tolist()
+        inside = np.abs(refined.points[:, :2]).max(axis=1) < 0.1
+        np.testing.assert_allclose(refined["x"][inside], refined.points[inside, 0], atol=0.05)
+
+    def test_faces_of_many_sizes_become_quads(self):
+        points, faces = cylinder(6)
+        padded = np.concatenate([[len(face), *face] for face in faces])
+        refined = subdivide(self.pyvista.PolyData(points, padded), 1, "catmull-clark")
+        expected = refine(Mesh(points, faces), catmull_clark(), 1).mesh
+        np.testing.assert_allclose(refined.points, expected.vertices, atol=1e-6)
+        np.testing.assert_array_equal(refined.regular_faces, expected.faces)
 
     def test_lines_and_points_beside_triangles_are_refused_with_what_to_do(self):
         """To triangulate it does not help: lines are still there."""

@@ -20,19 +20,19 @@ from train.data.pairs.solid import solid_pairs
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.08,
-        grid_pair: 0.12,
+        patch_pair: 0.05,
+        grid_pair: 0.10,
         sphere_pair: 0.05,
         faceted_pair: 0.08,
-        lathe_pair: 0.16,
+        lathe_pair: 0.10,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.26, solid_pairs: 0.25}
+    {machined_pairs: 0.22, solid_pairs: 0.40}
 )
 
-MOST_FACES = 2500
+MOST_FACES = 1200
 
 
 def pair_stream(seed: int) -> Iterator[Pair]:
