@@ -71,9 +71,9 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     from pns_common.model.file import DEFAULT_MODEL
 
     asked = SimpleNamespace(
-        scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False, quads=False
+        scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False
     )
-    asked.uv_smooth = "PRESERVE_BOUNDARIES"
+    asked.uv_smooth, asked.border = "PRESERVE_BOUNDARIES", "ALL"
     asked.model, asked.model_file, asked.budget = DEFAULT_MODEL, "", load_model().card.budget
     run = Run(refine_meshes([obj], choice_of(asked), Share()))
     longest, done = 0.0, False

@@ -52,6 +52,9 @@ class ModelEntry(BaseModel):
     sharpness_levels: int | None = Field(
         description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
     )
+    face_features: str | None = Field(
+        description="feature set of the vertices inside polygons; null where faces are triangles"
+    )
     sharpness_features: str | None = Field(
         description="feature set that says how sharp edges are; null where no network does"
     )

@@ -38,7 +38,7 @@ class PNS_PG_live(Settings, bpy.types.PropertyGroup):  # noqa: N801 (Blender's n
     )
     render_levels: IntProperty(
         name="Render Levels",
-        description="How often each triangle is cut into four when a picture is rendered",
+        description="How often each face is cut when a picture is rendered",
         default=2,
         min=1,
         max=6,
@@ -273,6 +273,7 @@ def _digest(mesh: bpy.types.Mesh, reading: Reading, live: PNS_PG_live) -> str:
     for array in (
         snapshot.points,
         snapshot.triangles,
+        snapshot.polygon_corners,
         snapshot.edges,
         snapshot.crease_sharpness,
         snapshot.groups,

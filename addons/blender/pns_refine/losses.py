@@ -20,11 +20,11 @@ BOUND = {
 SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "OCEAN"}
 
 
-def losses(obj: bpy.types.Object, reading: Reading, *, quads: bool) -> list[str]:
+def losses(obj: bpy.types.Object, reading: Reading, refined: Refined) -> list[str]:
     """Tell in sentences all that an object's mesh loses, or has only in part, when refined."""
     mesh: bpy.types.Mesh = obj.data
     return [
-        *_of_faces(reading, quads),
+        *_of_faces(reading, refined),
         *_of_attributes(mesh, reading),
         *_of_creases(mesh),
         *_of_normals(mesh),
@@ -34,13 +34,10 @@ def losses(obj: bpy.types.Object, reading: Reading, *, quads: bool) -> list[str]
     ]
 
 
-def _of_faces(reading: Reading, quads: bool) -> list[str]:
+def _of_faces(reading: Reading, refined: Refined) -> list[str]:
     said = []
-    largest = reading.largest_polygon
-    if largest > 3 and not quads:
+    if reading.snapshot.has_polygons and (np.diff(refined.faces.starts) == 3).all():
         said.append("Faces of more than three corners became triangles")
-    elif largest > 4:
-        said.append("Faces of more than four corners became triangles")
     loose = int((~reading.snapshot.edge_used).sum())
     if loose:
         said.append(f"{loose:,} edges without faces are kept as they are, not refined")
@@ -95,7 +92,7 @@ def _of_keys(mesh: bpy.types.Mesh) -> list[str]:
     key = mesh.shape_keys
     if key is None:
         return []
-    said = ["Shape keys are refined by Loop's masks; the correction is the basis's"]
+    said = ["Shape keys are refined by the scheme's masks; the correction is the basis's"]
     if not key.use_relative:
         said.append("Absolute shape keys are evenly spaced in time again")
     return said

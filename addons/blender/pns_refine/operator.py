@@ -16,11 +16,11 @@ from .live_nodes import remove_modifier
 from .losses import subdividing_modifiers
 from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
-from .settings import Settings, choice_of
+from .settings import Settings, choice_of, keeps_polygons
 from .words import forecast, listed, too_many
 from .writing import take_name
 
-# Above so many triangles the work goes on beside the interface, and there is no redo panel.
+# Above so many faces the work goes on beside the interface, and there is no redo panel.
 AT_ONCE = 60_000
 # What still reaches the viewport while a run goes on.
 PASSED_ON = {
@@ -35,14 +35,19 @@ PASSED_ON = {
 }
 
 
-def triangle_count(mesh: bpy.types.Mesh) -> int:
-    """Return how many triangles a mesh's faces are cut into."""
-    return len(mesh.loops) - 2 * len(mesh.polygons)
+def made_count(objects: list[bpy.types.Object], settings: Settings) -> int:
+    """Return how many faces there will be."""
+    made, whole = 0, keeps_polygons(settings)
+    for obj in objects:
+        corners, faces = len(obj.data.loops), len(obj.data.polygons)
+        polygons = whole and corners != 3 * faces
+        made += corners if polygons else 4 * (corners - 2 * faces)
+    return made * 4 ** (settings.levels - 1)
 
 
-def fits_at_once(triangles: int) -> bool:
-    """Return whether so many triangles are made without a wait that one would notice."""
-    return triangles <= AT_ONCE and are_compiled()
+def fits_at_once(faces: int) -> bool:
+    """Return whether so many faces are made without a wait that one would notice."""
+    return faces <= AT_ONCE and are_compiled()
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -86,7 +91,7 @@ class Refining(Settings):
         column = layout.column()
         column.enabled = self.keep_original
         column.prop(self, "beside")
-        draw_forecast(layout, chosen_objects(context), self.levels)
+        draw_forecast(layout, chosen_objects(context), self)
 
     def refused(self, context: bpy.types.Context) -> bool:
         """Return whether an object would change that its own file alone can keep; it is said."""
@@ -140,7 +145,7 @@ class Refining(Settings):
 
 
 class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender's names)
-    """Refine the selected meshes: Loop subdivision with a small, bounded, learned correction"""
+    """Refine the selected meshes: subdivision with a small, bounded, learned correction"""
 
     bl_idname = "object.pns_refine"
     bl_label = "Refine with PNS"
@@ -148,8 +153,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Refine at once what is small, and the rest beside the interface."""
-        count = sum(triangle_count(o.data) for o in chosen_objects(context)) * 4**self.levels
-        if fits_at_once(count):
+        if fits_at_once(made_count(chosen_objects(context), self)):
             return self.execute(context)
         chosen = {name: getattr(self, name) for name in self.as_keywords()}
         bpy.ops.object.pns_refine_large("INVOKE_DEFAULT", **chosen)
@@ -283,11 +287,14 @@ def homes_of(obj: bpy.types.Object) -> list[bpy.types.Collection]:
     return own or [bpy.context.scene.collection]
 
 
-def draw_forecast(layout: bpy.types.UILayout, objects: list[bpy.types.Object], levels: int) -> None:
+def draw_forecast(
+    layout: bpy.types.UILayout, objects: list[bpy.types.Object], settings: Settings
+) -> None:
     """Show how many faces there will be, whether that is wise, and what subdivides them again."""
-    count = sum(triangle_count(o.data) for o in objects)
-    layout.label(text=forecast(count, levels), icon="INFO")
-    warning = too_many(count, levels)
+    made = made_count(objects, settings)
+    faces = sum(len(o.data.polygons) for o in objects)
+    layout.label(text=forecast(faces, made), icon="INFO")
+    warning = too_many(made)
     if warning:
         layout.label(text=warning, icon="ERROR")
     draw_subdivided(layout, objects)

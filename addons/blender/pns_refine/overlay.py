@@ -17,7 +17,7 @@ RAMP, ATTRIBUTE, PAINT, SCALE = "Ramp", "Attribute", "Paint", "Scale"
 TITLES = {
     "pns_ratio": "Proximity ratio",
     "pns_gate": "Gate",
-    "pns_distance": "Distance from Loop",
+    "pns_distance": "Distance from plain scheme",
 }
 # Viridis at five places: even steps of lightness, and readable without red and green.
 COLOURS = (

@@ -28,7 +28,7 @@ class VIEW3D_PT_pns(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
         last = context.window_manager.operator_properties_last(OBJECT_OT_pns_refine.bl_idname)
         layout.prop(last, "levels")
         if context.object is not None and chosen_objects(context):
-            draw_forecast(layout, chosen_objects(context), last.levels)
+            draw_forecast(layout, chosen_objects(context), last)
 
 
 class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
@@ -113,7 +113,7 @@ class VIEW3D_PT_pns_live(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's name
         settings.draw_settings(layout)
         layout.prop(settings, "render_levels")
         layout.prop(settings, "automatic")
-        draw_forecast(layout, [obj], settings.levels)
+        draw_forecast(layout, [obj], settings)
         if settings.problem:
             layout.label(text=settings.problem, icon="ERROR")
         row = layout.row(align=True)

@@ -37,7 +37,6 @@ class Reading:
     groups: tuple[Group, ...]
     key_names: tuple[str, ...]
     empty_members: int
-    largest_polygon: int
 
 
 def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
@@ -79,7 +78,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
         offsets=offsets,
         layers=tuple(layers),
     )
-    return Reading(snapshot, _groups(mesh), keys, empty, int(sizes.max(initial=0)))
+    return Reading(snapshot, _groups(mesh), keys, empty)
 
 
 def _cut(mesh: bpy.types.Mesh) -> np.ndarray:

@@ -139,7 +139,7 @@ def refine_mesh(
     finally:
         job.cancel()
     new, refused = yield from write_mesh(refined, reading, mesh, into)
-    notes = losses(obj, reading, quads=choice.quads) + irregularities(refined) + refused
+    notes = losses(obj, reading, refined) + irregularities(refined) + refused
     remember(new, refined, notes)
     return Made(mesh, new, refined)
 

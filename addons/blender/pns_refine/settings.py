@@ -10,13 +10,15 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from pns_common import load_model
-from pns_common.model.file import DEFAULT_MODEL, bundled_models
+from pns_common.model.file import COMPANIONS, DEFAULT_MODEL, bundled_models
 from pns_common.model.session import OnnxModel
 
 from .refining.compute import Choice
 from .refining.snapshot import Smoothing
 
 NO_ANGLE = math.pi
+# Rules of boundaries by the names of Blender's Subdivision Surface.
+BORDERS = {"ALL": "smooth", "PRESERVE_CORNERS": "corners"}
 # Since 5.0 a path says whether it may begin at the folder of the file, "//".
 PATH_OPTIONS = {"ANIMATABLE"}
 if bpy.app.version >= (5, 0, 0):
@@ -52,7 +54,7 @@ class Settings:
 
     levels: IntProperty(
         name="Levels",
-        description="How often each triangle is cut into four",
+        description="How often each face is cut: polygons into quads, triangles into four",
         default=2,
         min=1,
         max=6,
@@ -61,8 +63,16 @@ class Settings:
         name="Scheme",
         description="How new vertices are placed",
         items=(
-            ("PNS", "PNS", "Loop's positions with a learned correction that is bounded"),
-            ("LOOP", "Loop", "Loop subdivision without correction"),
+            (
+                "PNS",
+                "PNS",
+                "Catmull–Clark, or Loop for triangles alone, with a small, learned correction",
+            ),
+            (
+                "LOOP",
+                "Loop",
+                "Loop subdivision without correction; polygons are cut into triangles",
+            ),
         ),
         default="PNS",
     )
@@ -81,7 +91,7 @@ class Settings:
     )
     budget: FloatProperty(
         name="Budget C",
-        description="How large the correction may be; 0 is Loop",
+        description="How large the correction may be; 0 is the plain scheme",
         default=BUDGET,
         min=0.0,
         soft_max=max(4.0, 1.25 * BUDGET),
@@ -107,12 +117,15 @@ class Settings:
         "or hard where most of it is shaded smooth",
         default=True,
     )
-    quads: BoolProperty(
-        name="Join Quads",
-        description="Join the triangles that come of a quad to quads again",
-        default=False,
+    border: EnumProperty(
+        name="Boundary",
+        description="How open boundaries are smoothed",
+        items=(
+            ("PRESERVE_CORNERS", "Keep Corners", "Smooth, but for corners that one face has alone"),
+            ("ALL", "All", "Smooth, corners too"),
+        ),
+        default="ALL",
     )
-
     uv_smooth: EnumProperty(
         name="UV Smooth",
         description="Which points of UV maps stay in their places",
@@ -139,8 +152,13 @@ class Settings:
         column.enabled = self.scheme == "PNS"
         column.prop(self, "crease_lines")
         layout.prop(self, "crease_angle")
-        layout.prop(self, "quads")
+        layout.prop(self, "border")
         layout.prop(self, "uv_smooth")
+
+
+def keeps_polygons(settings: Settings) -> bool:
+    """Return whether polygons become quads; for a model file they count as triangles."""
+    return settings.scheme == "PNS" and not settings.model_file and settings.model in COMPANIONS
 
 
 def choice_of(settings: Settings) -> Choice:
@@ -158,6 +176,6 @@ def choice_of(settings: Settings) -> Choice:
         limit=settings.limit,
         crease_angle=None if angle >= NO_ANGLE else angle,
         crease_lines=settings.crease_lines,
-        quads=settings.quads,
+        border=BORDERS[settings.border],
         uv_smooth=Smoothing(settings.uv_smooth),
     )

@@ -8,16 +8,16 @@ from typing import Any
 MANY = 1_000_000
 
 
-def forecast(triangles: int, levels: int) -> str:
+def forecast(faces: int, made: int) -> str:
     """Tell how many faces there will be."""
-    return f"{triangles * 4**levels:,} triangles from {triangles:,}"
+    return f"{made:,} faces from {faces:,}"
 
 
-def too_many(triangles: int, levels: int) -> str | None:
+def too_many(made: int) -> str | None:
     """Return a warning where there will be more faces than work well."""
-    if triangles * 4**levels <= MANY:
+    if made <= MANY:
         return None
-    return f"More than {MANY:,} triangles: this takes long, and much memory"
+    return f"More than {MANY:,} faces: this takes long, and much memory"
 
 
 def certificate(
@@ -29,7 +29,7 @@ def certificate(
     if report["scheme"] == "loop":
         return [f"{steps} of Loop, without correction"]
     lines = [f"{steps} of PNS, model {report['model']}, C = {report['budget']:.3g}"]
-    lines.append(f"No vertex is farther than {length(farthest)} from Loop's,")
+    lines.append(f"No vertex is farther than {length(farthest)} from the plain scheme's,")
     lines.append(f"no point of the limit surface farther than {length(report['limit_distance'])}")
     bound = report["limit_distance_bound"]
     if bound is not None:

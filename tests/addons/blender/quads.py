@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from addons.blender.pns_refine.refining.snapshot import Layer, Snapshot
@@ -25,6 +27,13 @@ def grid(cells: int, layers: tuple[Layer, ...] = ()) -> Snapshot:
     first = (np.arange(cells)[:, None] * side + np.arange(cells)).reshape(-1)
     quads = np.stack([first, first + side, first + side + 1, first + 1], axis=1)
     return snapshot(points.reshape(-1, 3), quads, 0.0, layers)
+
+
+def cut(shape: Snapshot) -> Snapshot:
+    """The same mesh, whose polygons are the triangles."""
+    count = len(shape.triangles)
+    starts, corners = 3 * np.arange(count + 1), np.arange(3 * count).reshape(-1, 3)
+    return replace(shape, corners=corners, polygons=np.arange(count), polygon_corners=starts)
 
 
 def snapshot(

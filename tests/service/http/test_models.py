@@ -189,7 +189,7 @@ def test_the_log_names_the_model(client: TestClient, caplog: pytest.LogCaptureFi
     with caplog.at_level("INFO", logger="pns.service"):
         report(client, "model=vertices")
         report(client, "scheme=loop")
-    assert "pns (vertices) levels=2" in caplog.text
+    assert "auto (vertices) levels=2" in caplog.text
     assert "loop levels=2" in caplog.text
 
 

@@ -3,37 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Mesh, loop, pns, sharp_edges
+from pns_common import Creases, Scheme, load_model, loop, pns, sharp_edges
 from pns_common.creases import NO_CREASES
 from pns_common.limit import limit_positions
+from pns_common.model.file import COMPANIONS
 from pns_common.model.session import Model
+from pns_common.parallel import Blocks, available_threads
+from pns_common.schemes import named_scheme
 from pns_common.topology import EdgeClass, Topology
 
 from .corners import refine_corners
 from .edges import edge_parents
-from .faces import (
-    FacePlan,
-    diagonal_children,
-    quad_diagonals,
-    quad_faces,
-    triangle_faces,
-    used_edges,
-)
 from .hidden import hide_within
 from .positions import Positions, refine_positions
 from .shown_creases import shown_creases
-from .snapshot import Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
-from .steps import Steps, edge_numbers, level_steps, refine_columns
+from .snapshot import Control, Faces, Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
+from .steps import Steps, edge_numbers, level_steps, refine_columns, straight_level
 from .votes import vote_at_corners, vote_at_points
 from .watched import WatchedModel
 
-# How much of the work the positions are; Loop's own are needed for the distance.
-SHARES = {"positions": 0.6, "loop": 0.15, "columns": 0.15, "corners": 0.1}
+# How much of the work the positions are; the base scheme's own are needed for the distance.
+SHARES = {"positions": 0.6, "base": 0.15, "columns": 0.15, "corners": 0.1}
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,8 @@ class Choice:
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
     none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
-    card asks for it. ``quads`` joins the triangles of quads again. ``uv_smooth`` is for UV maps.
+    card asks for it. ``border`` is the rule of boundaries, as in ``pns_common.Creases``.
+    ``uv_smooth`` is for UV maps.
     """
 
     model: Model | None
@@ -52,7 +48,7 @@ class Choice:
     limit: bool = False
     crease_angle: float | None = None
     crease_lines: bool = True
-    quads: bool = False
+    border: str = "smooth"
     uv_smooth: Smoothing = Smoothing.PRESERVE_BOUNDARIES
 
 
@@ -65,24 +61,23 @@ def compute(
         PnsError: the mesh cannot be refined, or the model fails.
     """
     bar = _Bar(progress)
-    scheme = loop()
-    if choice.model is not None:
-        scheme = pns(WatchedModel(choice.model, bar.look_up), choice.budget)
-    mesh = Mesh(snapshot.points, snapshot.triangles)
-    lines = shown_creases(snapshot, scheme) if choice.crease_lines else NO_CREASES
+    scheme = scheme_of(snapshot, choice, bar.look_up)
+    base = scheme.base
+    control = snapshot.control(whole=base.polygons)
+    mesh, border = control.mesh, choice.border
+    lines = shown_creases(snapshot, control, scheme) if choice.crease_lines else NO_CREASES
     soft, lines = (NO_CREASES, lines) if lines.sharpness is None else (lines, NO_CREASES)
-    pairs, crease_sharpness = all_creases(snapshot, choice.crease_angle, lines)
-    counts = len(mesh.vertices), choice.levels
-    steps = level_steps(mesh.faces, *counts, pairs, crease_sharpness, soft)
+    pairs, crease_sharpness = all_creases(snapshot, control, choice.crease_angle, lines)
+    cage = mesh.topology().with_border(border), base, choice.levels
+    steps = level_steps(*cage, pairs, crease_sharpness, soft)
     positions = refine_positions(
-        mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
+        mesh, scheme, steps, border, limit=choice.limit, progress=bar.within("positions")
     )
     plain = steps
     if any(found.named is not None and len(found.named) for found in (soft, lines)):
-        # Loop alone knows of no lines.
-        own = all_creases(snapshot, choice.crease_angle)
-        plain = level_steps(mesh.faces, *counts, *own)
-    distance = _distance_from_loop(mesh, choice, plain, positions, bar)
+        # The base scheme alone knows of no lines.
+        plain = level_steps(*cage, *all_creases(snapshot, control, choice.crease_angle))
+    distance = _distance_from_base(control, choice, plain, positions, bar)
 
     offsets = snapshot.offsets
     moved = np.concatenate([snapshot.groups, *offsets], axis=1)
@@ -91,30 +86,24 @@ def compute(
     group_count = snapshot.groups.shape[1]
     moves = columns[:, group_count:]
     if choice.limit:
-        moves = limit_positions(moves, steps.at_last) if moves.shape[1] else moves
+        at_last = steps.at_last, Blocks(available_threads()), base
+        moves = limit_positions(moves, *at_last) if moves.shape[1] else moves
 
-    parents = np.repeat(snapshot.polygons, 4**choice.levels)
-    plan = _plan(snapshot, choice, steps, parents)
-    edge_parent = edge_parents(steps, snapshot)
-    used = used_edges(plan.faces, len(steps.final.edges))
+    faces = _faces(control, steps)
     loose = np.flatnonzero(~snapshot.edge_used)
-    own_edge = np.r_[edge_parent[used], loose]
-    carry = _Carry(snapshot, choice, steps, plan, own_edge)
+    own_edge = np.r_[edge_parents(steps, snapshot), loose]
+    carry = _Carry(snapshot, control, choice, steps, faces, own_edge)
     layers = []
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
         bar.reach("corners", (number + 1) / len(snapshot.layers))
-    renumbered = np.cumsum(used) - 1
-    faces = replace(plan.faces, edges=renumbered[plan.faces.edges])
-    edges = np.concatenate([steps.final.edges[used], snapshot.edges[loose]])
+    edges = np.concatenate([steps.final.edges, snapshot.edges[loose]])
     old, count = len(snapshot.points), len(positions.points)
     return Refined(
         points=positions.points,
         faces=faces,
         edges=edges,
-        crease_sharpness=np.r_[
-            _final_crease_sharpness(steps)[used], snapshot.crease_sharpness[loose]
-        ],
+        crease_sharpness=np.r_[_final_crease_sharpness(steps), snapshot.crease_sharpness[loose]],
         groups=np.clip(columns[:, :group_count], 0, 1),
         offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
         layers=hide_within(tuple(layers), faces, edges, own_edge < 0, old, count),
@@ -127,15 +116,29 @@ def compute(
     )
 
 
+def scheme_of(
+    snapshot: Snapshot, choice: Choice, look_up: Callable[[], None] = lambda: None
+) -> Scheme:
+    """Return the scheme of a choice; for polygons it is that of the model's companion, if any."""
+    model, budget = choice.model, choice.budget
+    if model is None:
+        return loop()
+    if snapshot.has_polygons and model.name in COMPANIONS:
+        # A budget that was left alone is the model's own.
+        budget = None if budget == model.card.budget else budget
+        model = load_model(COMPANIONS[model.name])
+    return pns(WatchedModel(model, look_up), budget)
+
+
 def all_creases(
-    snapshot: Snapshot, angle: float | None, lines: Creases = NO_CREASES
+    snapshot: Snapshot, control: Control, angle: float | None, lines: Creases = NO_CREASES
 ) -> tuple[Int[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
     """Return sharp edges, for how many levels: marked, bent beyond ``angle``, or named lines."""
     marked = (snapshot.crease_sharpness > 0) & snapshot.edge_used
     pairs, crease_sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
     found = []
     if angle is not None:
-        bent = sharp_edges(Mesh(snapshot.points, snapshot.triangles), float(np.degrees(angle)))
+        bent = sharp_edges(control.mesh, float(np.degrees(angle)))
         found.append((bent, np.inf))
     if lines.named is not None:
         found.append((lines.named, np.inf if lines.levels is None else float(lines.levels)))
@@ -160,31 +163,35 @@ def split_vertices(snapshot: Snapshot, topology: Topology) -> int:
     return int((np.r_[False, same] | np.r_[same, False]).sum())
 
 
-def _distance_from_loop(
-    mesh: Mesh, choice: Choice, steps: Steps, positions: Positions, bar: _Bar
+def _distance_from_base(
+    control: Control, choice: Choice, steps: Steps, positions: Positions, bar: _Bar
 ) -> Float[np.ndarray, " W"]:
-    """Return how far each vertex lies from where Loop alone would have it."""
+    """Return how far each vertex lies from where the base scheme alone would have it."""
     if choice.model is None:
         return np.zeros(len(positions.points))
-    plain = refine_positions(mesh, loop(), steps, limit=choice.limit, progress=bar.within("loop"))
+    asked = control.mesh, named_scheme(steps.base.name), steps, choice.border
+    plain = refine_positions(*asked, limit=choice.limit, progress=bar.within("base"))
     return np.linalg.norm(positions.points - plain.points, axis=1)
 
 
 def _at_later(values: Float[np.ndarray, " L"], steps: Steps) -> Float[np.ndarray, " W"]:
-    """Carry values from the vertices of a level to the last; new ones have their ends' mean."""
+    """Carry values from the vertices of a level to the last; new ones have a mean."""
     for step in steps.steps:
         if step.topology.vertex_count == len(values):
-            values = np.concatenate([values, values[step.topology.edges].mean(axis=1)])
+            values = straight_level(values[:, None], step.topology, steps.base)[:, 0]
     return values
 
 
-def _plan(
-    snapshot: Snapshot, choice: Choice, steps: Steps, parents: Int[np.ndarray, " T"]
-) -> FacePlan:
-    if not choice.quads:
-        return triangle_faces(steps.final, parents)
-    diagonal = diagonal_children(quad_diagonals(snapshot), choice.levels)
-    return quad_faces(steps.final, parents, diagonal)
+def _faces(control: Control, steps: Steps) -> Faces:
+    final, children = steps.final, 4 ** len(steps.steps)
+    if steps.base.polygons:
+        children = np.diff(control.mesh.offsets) * (children // 4)
+    return Faces(
+        starts=final.offsets.astype(np.int64),
+        vertices=final.corners.astype(np.int64),
+        edges=final.corner_edges.astype(np.int64),
+        parents=np.repeat(control.polygons, children),
+    )
 
 
 def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
@@ -200,9 +207,10 @@ class _Carry:
     """What becomes of a layer: its values at the new points, edges, faces or corners."""
 
     snapshot: Snapshot
+    control: Control
     choice: Choice
     steps: Steps
-    plan: FacePlan
+    faces: Faces
     edge_parent: Int[np.ndarray, " E"]
 
     def __call__(self, layer: Layer) -> np.ndarray:
@@ -227,21 +235,20 @@ class _Carry:
         return np.where(known[:, None], values, np.zeros_like(values))
 
     def _face(self, layer: Layer) -> np.ndarray:
-        return layer.values[self.plan.faces.parents]
+        return layer.values[self.faces.parents]
 
     def _corner(self, layer: Layer) -> np.ndarray:
-        values = layer.values[self.snapshot.corners.reshape(-1)]
+        values = layer.values[self.control.corners]
         if layer.rule is Rule.BLEND:
             # Directions are stored roughly: what differs by less than that is no seam.
             same = np.round(values, 3) if layer.unit else None
             creases = self.steps.steps[0].creases
             uv = layer.kind == "FLOAT2"
             smoothing = self.choice.uv_smooth if uv else Smoothing.PRESERVE_BOUNDARIES
-            triangles, levels = self.snapshot.triangles, self.choice.levels
-            values = refine_corners(values, triangles, levels, creases, same, smoothing)
-        else:
-            values = vote_at_corners(values, self.choice.levels)
-        return values[self.plan.corner]
+            mesh, levels = self.control.mesh, self.choice.levels
+            faces = mesh.corners, mesh.offsets
+            return refine_corners(values, faces, self.steps.base, levels, creases, same, smoothing)
+        return vote_at_corners(values, self.steps.base, self.choice.levels)
 
 
 def _unit(values: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N K"]:

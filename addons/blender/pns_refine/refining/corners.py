@@ -7,35 +7,40 @@ from jaxtyping import Float, Int
 
 from pns_common.parallel import Blocks
 from pns_common.rows import first_places
-from pns_common.topology import Topology, build_topology, halves_of, split_faces
+from pns_common.schemes import BaseScheme
+from pns_common.topology import Topology, build_topology, halves_of
 
 from .snapshot import Smoothing, edge_keys
-from .steps import one_level, with_creases
+from .steps import one_level, straight_level, with_creases
 
 
 def refine_corners(
     values: Float[np.ndarray, "C K"],
-    faces: Int[np.ndarray, "F 3"],
+    faces: tuple[Int[np.ndarray, " C"], Int[np.ndarray, " F1"]],
+    base: BaseScheme,
     levels: int,
     creases: Int[np.ndarray, "N 2"],
     same: Float[np.ndarray, "C J"] | None = None,
     smoothing: Smoothing = Smoothing.PRESERVE_BOUNDARIES,
 ) -> Float[np.ndarray, "D K"]:
-    """Refine values at three corners a face, in faces' order, to those of the faces' children.
+    """Refine values at the corners of faces to those of the faces' children.
+
+    ``faces`` are the corners' vertices, and where the corners of each face begin.
 
     Corners of a vertex that agree are one point of a patch, and a seam runs where they differ.
-    Inside a patch Loop's masks are used, as for the vertices. ``smoothing`` says which values stay:
-    those on the border, whose edges then get their midpoints, so that both sides of a seam keep
-    meeting; those of a corner of one face alone; none; or all, which is linear. ``same`` are the
-    values that say whether corners agree, if not ``values``.
+    Inside a patch the scheme's masks are used, as for the vertices. ``smoothing`` says which values
+    stay: those on the border, whose edges then get their midpoints, so that both sides of a seam
+    keep meeting; those of a corner of one face alone; none; or all, which is linear. ``same`` are
+    the values that say whether corners agree, if not ``values``.
     """
-    patch = patch_points(faces.reshape(-1), values if same is None else same)
+    vertices, offsets = faces
+    patch = patch_points(vertices, values if same is None else same)
     first = first_places(patch, int(patch.max(initial=-1)) + 1)
-    columns, vertex_of = values[first], faces.reshape(-1)[first]
-    patches = patch.reshape(-1, 3)
+    columns, vertex_of = values[first], vertices[first]
+    plain = build_topology((patch, offsets), len(columns))
     sharp: Int[np.ndarray, "N 2"] | None = None
     for level in range(levels):
-        topology = build_topology(patches, len(columns))
+        topology = plain
         if level == 0 and len(creases):
             named = np.isin(edge_keys(vertex_of[topology.edges]), edge_keys(creases))
             sharp = topology.edges[named].astype(np.int64)
@@ -45,16 +50,16 @@ def refine_corners(
             topology = with_creases(topology, sharp)
             sharp = halves_of(topology, topology.crease_edges)
         if smoothing is Smoothing.NONE:
-            columns = np.concatenate([columns, columns[topology.edges].mean(axis=1)])
+            columns = straight_level(columns, topology, base)
         else:
-            finer = one_level(columns, topology)
+            finer = one_level(columns, topology, base)
             if smoothing is Smoothing.PRESERVE_CORNERS:
-                border &= np.bincount(patches.reshape(-1), minlength=len(columns)) == 1
+                border &= np.bincount(plain.corners, minlength=len(columns)) == 1
             if smoothing is not Smoothing.SMOOTH_ALL:
                 finer[: len(columns)][border] = columns[border]
             columns = finer
-        patches = split_faces(topology, Blocks())
-    return columns[patches.reshape(-1)]
+        plain = base.split(plain, Blocks())
+    return columns[plain.corners]
 
 
 def patch_points(

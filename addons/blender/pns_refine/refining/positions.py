@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from pns_common import Creases, Mesh, Refinement, Scheme, loop, refine
+from pns_common import Creases, Mesh, Refinement, Scheme, refine
 from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.parallel import Blocks, available_threads
 from pns_common.reference_length import measure_reference_length
+from pns_common.schemes import named_scheme
 
 from .steps import Steps
 
 Progress = Callable[[int, int], None]
-# How far from Loop a level may have gone, and how far its budget allows.
+# How far from the base scheme a level may have gone, and how far its budget allows.
 _Distances = tuple[float, float]
 
 
@@ -32,9 +34,11 @@ class Positions:
 
 
 def refine_positions(
-    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
+    mesh: Mesh, scheme: Scheme, steps: Steps, border: str, *, limit: bool, progress: Progress
 ) -> Positions:
-    """Refine the vertices of a mesh; ``limit`` puts them where Loop's rules would end.
+    """Refine the vertices of a mesh; ``limit`` puts them where the base scheme would end.
+
+    ``border`` is the rule of boundaries, as in ``Creases``.
 
     A crease that the last level keeps sharp is then sharp for good, as ``refine`` has it.
 
@@ -42,8 +46,8 @@ def refine_positions(
         PnsError: the mesh cannot be refined, or the model fails; and whatever ``progress`` raises.
     """
     if steps.wears_off:
-        return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
-    creases, levels = Creases(steps.steps[0].creases), len(steps.steps)
+        return _level_by_level(mesh, scheme, steps, border, limit=limit, progress=progress)
+    creases, levels = Creases(steps.steps[0].creases, border=border), len(steps.steps)
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
     added = next((step.added for step in reversed(made.steps) if step.added), None)
     acted = made if added is None else added
@@ -51,20 +55,20 @@ def refine_positions(
 
 
 def _level_by_level(
-    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
+    mesh: Mesh, scheme: Scheme, steps: Steps, border: str, *, limit: bool, progress: Progress
 ) -> Positions:
     """Refine level by level with the creases of each; half sharp ones mix two readings.
 
-    Both readings lie within the budget of Loop's, so their mixture lies within the budget of the
-    mixture of Loop's. Such a level's report is the sharper reading's; its distance to Loop is the
-    larger of both.
+    Both readings lie within the budget of the base scheme's, so their mixture lies within the
+    budget of the mixture of those. Such a level's report is the sharper reading's; its distance to
+    the base scheme is the larger of both.
     """
     length = measure_reference_length(mesh.vertices, mesh.corners)
-    counter, acted = _Counter(progress, steps), None
+    counter, acted = _Counter(progress, steps, border), None
     reports: list[Any] = []
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
-        rule = scheme if scheme.acts_at(depth) else loop()
+        rule = scheme if scheme.acts_at(depth) else named_scheme(steps.base.name)
         smooth = made = counter.reading(mesh, rule, length, step.soft.with_named(step.creases))
         points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
@@ -77,10 +81,11 @@ def _level_by_level(
         mesh = Mesh(points, made.mesh.faces)
     points, normals = mesh.vertices, None
     if limit:
-        kept_back = limit_shift(mesh.vertices, steps.at_last)
+        at_last = steps.at_last, Blocks(available_threads()), steps.base
+        kept_back = limit_shift(mesh.vertices, *at_last)
         distances.append((kept_back, kept_back))
-        points = limit_positions(mesh.vertices, steps.at_last)
-        normals = limit_normals(mesh.vertices, steps.at_last).vertices
+        points = limit_positions(mesh.vertices, *at_last)
+        normals = limit_normals(mesh.vertices, *at_last).vertices
     report = _one_report(reports, _combined(distances, sum))
     return Positions(points, acted.ratio, acted.gate, normals, report)
 
@@ -108,11 +113,12 @@ def _one_report(reports: list[Any], distances: _Distances) -> dict[str, Any]:
 class _Counter:
     """Refines by one level, and counts the faces made over all of them."""
 
-    def __init__(self, progress: Progress, steps: Steps) -> None:
-        self._progress, self._done = progress, 0
+    def __init__(self, progress: Progress, steps: Steps, border: str) -> None:
+        self._progress, self._done, self._border = progress, 0, border
+        following = [step.topology for step in steps.steps[1:]] + [steps.final]
         self._total = sum(
-            4 * len(step.topology.faces) * (1 if step.mixture is None else 2)
-            for step in steps.steps
+            finer.face_count * (1 if step.mixture is None else 2)
+            for step, finer in zip(steps.steps, following, strict=True)
         )
 
     def reading(
@@ -122,8 +128,9 @@ class _Counter:
         length: float,
         creases: Creases,
     ) -> Refinement:
+        creases = replace(creases, border=self._border)
         made = refine(mesh, scheme, 1, length, creases=creases, progress=self._tell)
-        self._done += len(made.mesh.faces)
+        self._done += made.mesh.face_count
         return made
 
     def _tell(self, done: int, total: int) -> None:

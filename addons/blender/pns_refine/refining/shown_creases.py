@@ -5,32 +5,32 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common import Creases, Mesh, Scheme
+from pns_common import Creases, Scheme
 from pns_common.creases import NO_CREASES
 from pns_common.sharpness import creases_by_name
 from pns_common.topology import Topology
 
-from .snapshot import Domain, Snapshot, edge_keys
+from .snapshot import Control, Domain, Snapshot, edge_keys
 
 
-def shown_creases(snapshot: Snapshot, scheme: Scheme) -> Creases:
+def shown_creases(snapshot: Snapshot, control: Control, scheme: Scheme) -> Creases:
     """Return the creases of a scheme by name, with the hard edges that the mesh's shading marks.
 
     A mesh whose polygons meet at hard edges alone is flat-shaded, and marks none.
     """
     if not scheme.creases.finds:
         return NO_CREASES
-    mesh = Mesh(snapshot.points, snapshot.triangles)
+    mesh = control.mesh
     topology, named = mesh.topology(), creases_by_name(mesh, scheme.creases, scheme)
-    edges, hard = shaded_edges(snapshot, topology)
+    edges, hard = shaded_edges(snapshot, control, topology)
     return named if hard.all() else named.with_named(edges[hard])
 
 
 def shaded_edges(
-    snapshot: Snapshot, topology: Topology
+    snapshot: Snapshot, control: Control, topology: Topology
 ) -> tuple[Int[np.ndarray, "N 2"], Bool[np.ndarray, " N"]]:
     """Return the edges between two polygons, and which are marked sharp or lie at flat faces."""
-    polygons = snapshot.polygons[topology.half_edges[topology.interior] // 3]
+    polygons = control.polygons[topology.face_of(topology.half_edges[topology.interior])]
     # A polygon's own diagonals have one normal on both sides.
     between = polygons[:, 0] != polygons[:, 1]
     polygons = polygons[between]

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common import Mesh
+
 
 class Domain(Enum):
     """What a layer's rows belong to."""
@@ -23,7 +25,7 @@ class Domain(Enum):
 class Rule(Enum):
     """How a new row comes of old ones."""
 
-    # Weighted by Loop's masks.
+    # Weighted by the scheme's masks.
     BLEND = "blend"
     # One of the parents' values: that of most, as numbers that only name something must not mix.
     VOTE = "vote"
@@ -63,7 +65,7 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A mesh as it was read, cut into triangles.
+    """A mesh as it was read, with the triangles that its polygons can be cut into.
 
     Attributes:
         points: positions of V vertices.
@@ -95,6 +97,35 @@ class Snapshot:
         sides = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=-1)
         return np.isin(edge_keys(self.edges), edge_keys(sides.reshape(-1, 2)))
 
+    @property
+    def has_polygons(self) -> bool:
+        """Tell whether a face has more than three corners."""
+        return len(self.triangles) != len(self.polygon_corners) - 1
+
+    def control(self, *, whole: bool) -> Control:
+        """Return the polygons, ``whole`` or cut into triangles.
+
+        Raises:
+            MeshError: the mesh cannot be refined.
+        """
+        if not whole:
+            triangles = Mesh(self.points, self.triangles)
+            return Control(triangles, self.corners.reshape(-1), self.polygons)
+        count = self.polygon_corners[-1]
+        vertices = np.empty(count, dtype=np.int64)
+        vertices[self.corners] = self.triangles
+        polygons = Mesh(self.points, (vertices, self.polygon_corners))
+        return Control(polygons, np.arange(count), np.arange(len(self.polygon_corners) - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """The mesh to refine, the snapshot's corner of each corner, and its polygon of each face."""
+
+    mesh: Mesh
+    corners: Int[np.ndarray, " H"]
+    polygons: Int[np.ndarray, " F"]
+
 
 @dataclass(frozen=True, eq=False)
 class Faces:
@@ -115,7 +146,8 @@ class Refined:
     """What became of a snapshot: the same arrays at the new vertices, edges, faces and corners.
 
     ``ratio`` and ``gate`` are the operator's diagnostics, ``distance`` is how far each vertex lies
-    from where Loop alone would have it. ``normals`` are the surface's own, where they are known.
+    from where the base scheme alone would have it. ``normals`` are the surface's own, where they
+    are known.
     ``split_vertices`` counts old vertices of faces' borders that share their place with another.
     """
 

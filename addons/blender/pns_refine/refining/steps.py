@@ -15,8 +15,8 @@ from jaxtyping import Float, Int
 
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.parallel import Blocks, available_threads
-from pns_common.schemes import LOOP
-from pns_common.topology import Topology, build_topology, halves_of, split_faces
+from pns_common.schemes import BaseScheme
+from pns_common.topology import Topology, halves_of
 
 from .snapshot import edge_keys
 
@@ -53,6 +53,7 @@ class Step:
 class Steps:
     """All levels, and what is left at the end: faces, and the sharpness of edges."""
 
+    base: BaseScheme
     steps: tuple[Step, ...]
     final: Topology
     pairs: Int[np.ndarray, "N 2"]
@@ -90,42 +91,42 @@ def crease_of(crease_sharpness: Float[np.ndarray, " E"]) -> Float[np.ndarray, " 
 
 
 def level_steps(
-    faces: Int[np.ndarray, "F 3"],
-    vertex_count: int,
+    control: Topology,
+    base: BaseScheme,
     levels: int,
     pairs: Int[np.ndarray, "N 2"],
     crease_sharpness: Float[np.ndarray, " N"],
     soft: Creases = NO_CREASES,
 ) -> Steps:
-    """Return ``levels`` levels' topologies; ``pairs`` of vertices name edges of this sharpness.
+    """Return ``levels`` levels' topologies; ``control`` is the first, without creases.
 
-    ``soft`` names edges that blend sharp and smooth rules, at as many levels as it says.
+    ``pairs`` of vertices name edges of this sharpness. ``soft`` names edges that blend sharp and
+    smooth rules, at as many levels as it says.
     """
     steps = []
     kept = crease_sharpness > 0
     pairs, crease_sharpness = pairs[kept], crease_sharpness[kept]
+    plain = control
     for depth in range(levels):
-        plain = build_topology(faces, vertex_count)
         sharp, soft = pairs[crease_sharpness >= 1], soft if soft.sharp_at(depth) else NO_CREASES
         topology = with_creases(soft.applied_by_name(plain), sharp)
-        mixture = _mixture(plain, pairs, crease_sharpness, soft)
+        mixture = _mixture(plain, base, pairs, crease_sharpness, soft)
         steps.append(Step(topology, sharp, soft, mixture))
         soft = _halves(soft, plain)
         pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
-        faces, vertex_count = split_faces(plain, Blocks()), vertex_count + len(plain.edges)
-    return Steps(tuple(steps), build_topology(faces, vertex_count), pairs, crease_sharpness)
+        plain = base.split(plain, Blocks())
+    return Steps(base, tuple(steps), plain, pairs, crease_sharpness)
 
 
 def refine_columns(columns: Float[np.ndarray, "V K"], steps: Steps) -> Float[np.ndarray, "W K"]:
-    """Refine columns by Loop's masks, level by level."""
+    """Refine columns by the scheme's masks, level by level."""
     if columns.shape[1] == 0:
         return np.zeros((steps.final.vertex_count, 0))
     for step in steps.steps:
-        smooth = one_level(columns, step.topology)
-        mixture = step.mixture
-        columns = (
-            smooth if mixture is None else mixture.of(smooth, one_level(columns, mixture.topology))
-        )
+        columns, given = one_level(columns, step.topology, steps.base), columns
+        if step.mixture is not None:
+            sharp = one_level(given, step.mixture.topology, steps.base)
+            columns = step.mixture.of(columns, sharp)
     return columns
 
 
@@ -146,9 +147,22 @@ def with_creases(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Topology:
     return topology.with_creases(topology.rows_of(pairs)) if len(pairs) else topology
 
 
-def one_level(columns: Float[np.ndarray, "V K"], topology: Topology) -> Float[np.ndarray, "W K"]:
-    """Refine columns by one level of Loop's masks."""
-    return LOOP.place(columns, topology, Blocks(available_threads()))
+def one_level(
+    columns: Float[np.ndarray, "V K"], topology: Topology, base: BaseScheme
+) -> Float[np.ndarray, "W K"]:
+    """Refine columns by one level of a scheme's masks."""
+    return base.place(columns, topology, Blocks(available_threads()))
+
+
+def straight_level(
+    columns: Float[np.ndarray, "V K"], topology: Topology, base: BaseScheme
+) -> Float[np.ndarray, "W K"]:
+    """Let old vertices keep their columns; those of edges and of faces have the mean."""
+    made = [columns, columns[topology.edges].mean(axis=1)]
+    if base.polygons:
+        starts, sizes = topology.offsets[:-1], np.diff(topology.offsets)
+        made.append(np.add.reduceat(columns[topology.corners], starts) / sizes[:, None])
+    return np.concatenate(made)
 
 
 def _halves(soft: Creases, topology: Topology) -> Creases:
@@ -161,11 +175,15 @@ def _halves(soft: Creases, topology: Topology) -> Creases:
 
 def _mixture(
     plain: Topology,
+    base: BaseScheme,
     pairs: Int[np.ndarray, "N 2"],
     crease_sharpness: Float[np.ndarray, " N"],
     soft: Creases,
 ) -> Mixture | None:
-    """Mix edges of less than a level left: sharp by that share, and their ends by their mean."""
+    """Mix edges of less than a level left: sharp by that share, their ends by the mean.
+
+    The vertex of a face takes the largest share of its edges.
+    """
     ending = crease_sharpness < 1
     if not ending.any():
         return None
@@ -177,7 +195,10 @@ def _mixture(
     count = np.bincount(ends, minlength=plain.vertex_count)
     at_vertices = total / np.maximum(count, 1)
     topology = with_creases(soft.applied_by_name(plain), pairs)
-    return Mixture(topology, pairs, np.concatenate([at_vertices, at_edges])[:, None])
+    shares = [at_vertices, at_edges]
+    if base.polygons:
+        shares.append(np.maximum.reduceat(at_edges[plain.corner_edges], plain.offsets[:-1]))
+    return Mixture(topology, pairs, np.concatenate(shares)[:, None])
 
 
 def _worn(

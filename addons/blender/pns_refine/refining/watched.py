@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common.model.card import ModelCard
-from pns_common.model.session import Model
+from pns_common.model.session import Model, PolygonModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,11 @@ class WatchedModel:
         """Return corrections of a block of vertices."""
         self.look_up()
         return self.model.vertex_correction(features, budget)
+
+    def face_correction(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
+        """Return corrections of a block of faces."""
+        self.look_up()
+        return cast(PolygonModel, self.model).face_correction(features, budget)
 
     def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
         """Return the sharpness of a block of edges."""

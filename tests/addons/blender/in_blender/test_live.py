@@ -88,7 +88,7 @@ def test_an_edit_while_it_is_refreshed_is_followed_too(pieces):
     bpy.ops.mesh.delete(type="VERT")
     bpy.ops.object.mode_set(mode="OBJECT")
     settle()
-    assert len(evaluated(obj).polygons) == 63 * 32
+    assert len(evaluated(obj).polygons) == 63 * 16
 
 
 def test_nothing_is_refined_again_without_an_edit():
@@ -190,7 +190,7 @@ def test_an_appended_copy_stays_out_of_the_scene(tmp_path):
     bpy.ops.wm.append(directory=f"{path}/Object/", filename="Grid")
     settle()
     assert [obj.name for obj in bpy.context.scene.objects] == ["Grid"]
-    assert len(evaluated(bpy.data.objects["Grid"]).polygons) == 16 * 32
+    assert len(evaluated(bpy.data.objects["Grid"]).polygons) == 16 * 16
 
 
 def test_apply_wants_object_mode():
@@ -286,7 +286,7 @@ def test_an_object_with_the_modifier_of_another_is_live_once_it_is_refreshed():
     chosen(other)
     bpy.ops.object.pns_live_refresh()
     before = shown(other)
-    assert len(evaluated(other).polygons) == 12 * 16
+    assert len(evaluated(other).polygons) == 6 * 16
     other.data.vertices[0].co.z += 1
     other.data.update()
     settle()
@@ -320,7 +320,7 @@ def test_renders_have_levels_of_their_own():
         for handler in getattr(bpy.app.handlers, name):
             handler(bpy.context.scene)
         count = len(evaluated(obj).polygons)
-        assert count == 32 * 4 ** (3 if name == "render_init" else 1)
+        assert count == 16 * 4 ** (3 if name == "render_init" else 1)
     np.testing.assert_array_equal(shown(obj), before)
 
 
@@ -338,7 +338,7 @@ def test_a_linked_object_is_refused_in_words(tmp_path):
 
 def test_what_a_linked_object_shows_is_its_files(tmp_path):
     obj = linked(started(cube()), tmp_path / "library.blend")
-    assert len(evaluated(obj).polygons) == 12 * 16
+    assert len(evaluated(obj).polygons) == 6 * 16
     for name in ("refresh", "apply", "remove"):
         with pytest.raises(RuntimeError, match="Linked from another file"):
             getattr(bpy.ops.object, f"pns_live_{name}")()

@@ -11,10 +11,10 @@ from scene import cube, evaluated, grid, numbers, points_of, refined
 
 
 @pytest.mark.parametrize("make", [lambda: grid(6), cube], ids=["smooth", "with lines"])
-def test_the_distance_is_that_from_loop(make):
+def test_the_distance_is_that_from_the_plain_scheme(make):
     obj = make()
-    new, loop = refined(obj), refined(obj, scheme="LOOP")
-    expected = np.linalg.norm(points_of(new.data) - points_of(loop.data), axis=1)
+    new, plain = refined(obj), refined(obj, budget=0.0)
+    expected = np.linalg.norm(points_of(new.data) - points_of(plain.data), axis=1)
     distances = numbers(new.data.attributes["pns_distance"].data, "value").ravel()
     np.testing.assert_allclose(distances, expected, atol=1e-6)
     assert distances.max() == pytest.approx(new.data.pns_result.pns_distance)

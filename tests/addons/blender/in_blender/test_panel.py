@@ -49,7 +49,7 @@ def test_without_an_object_nothing_but_the_button():
 def test_the_forecast_stands_below_the_button():
     cube()
     lines = drawn(panel.VIEW3D_PT_pns)
-    assert any("triangles from 12" in line for line in lines)
+    assert any("96 faces from 6" in line for line in lines)
 
 
 def test_a_million_faces_are_warned_of():
@@ -87,7 +87,7 @@ def test_the_overlay_has_a_legend_only_when_shown():
     bpy.ops.object.pns_overlay(shown="pns_distance")
     lines = drawn(panel.VIEW3D_PT_pns_overlay)
     assert "ramp" in lines
-    assert "[Distance from Loop]*" in lines
+    assert "[Distance from plain scheme]*" in lines
     assert lines[lines.index("ramp") + 1] == "0"
 
 

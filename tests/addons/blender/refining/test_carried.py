@@ -8,20 +8,22 @@ import pytest
 from addons.blender.pns_refine.refining.compute import SHARES, Choice, compute
 from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule, Smoothing
 from pns_common import Mesh, load_model, loop, refine
-from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, grid, snapshot
+from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, cut, grid, snapshot
 
 
-def carried(shape, domain, rule, values, levels=1, **choice):
+def carried(shape, domain, rule, values, levels=1, *, quads=False):
     """The rows of a layer after refinement, and the refined mesh."""
     layer = Layer("mine", "FLOAT", domain, rule, np.asarray(values))
     shape = type(shape)(**{**shape.__dict__, "layers": (layer,)})
-    made = compute(shape, Choice(None, levels, **choice))
+    # Without a budget it is Catmull–Clark.
+    made = compute(shape, Choice(load_model() if quads else None, levels, budget=0.0))
     return made.layers[0].values, made
 
 
-def test_positions_as_an_attribute_become_the_positions():
+@pytest.mark.parametrize("quads", [False, True])
+def test_positions_as_an_attribute_become_the_positions(quads):
     shape = grid(4)
-    carried_values, made = carried(shape, Domain.POINT, Rule.BLEND, shape.points, 2)
+    carried_values, made = carried(shape, Domain.POINT, Rule.BLEND, shape.points, 2, quads=quads)
     np.testing.assert_allclose(carried_values, made.points)
 
 
@@ -36,10 +38,11 @@ def test_votes_go_to_the_value_of_most_parents(low, high):
     assert carried_values[middle, 0] == low
 
 
-def test_an_edge_vertex_between_equals_has_their_value():
+@pytest.mark.parametrize("quads", [False, True])
+def test_a_new_vertex_between_equals_has_their_value(quads):
     shape = grid(5)
     values = (shape.points[:, :1] > 0).astype(int) * 7
-    carried_values, made = carried(shape, Domain.POINT, Rule.VOTE, values)
+    carried_values, made = carried(shape, Domain.POINT, Rule.VOTE, values, quads=quads)
     far = np.abs(made.points[:, 0]) > 0.41
     np.testing.assert_array_equal(carried_values[far, 0], np.where(made.points[far, 0] > 0, 7, 0))
 
@@ -96,13 +99,15 @@ def test_corner_values_that_are_the_positions_follow_them(quads):
 
 
 @pytest.mark.parametrize("levels", [1, 2])
-def test_both_sides_of_a_seam_divide_it_alike(levels):
+@pytest.mark.parametrize("quads", [False, True])
+def test_both_sides_of_a_seam_divide_it_alike(levels, quads):
     """Every side of the cube is a patch: its border must stay straight and evenly divided."""
     values = np.random.default_rng(0).random((24, 2))
-    carried_values, made = carried(cube(np.inf), Domain.CORNER, Rule.BLEND, values, levels)
+    asked = cube(np.inf), Domain.CORNER, Rule.BLEND, values, levels
+    carried_values, made = carried(*asked, quads=quads)
     checked = 0
     for corner, vertex in enumerate(made.faces.vertices):
-        side = made.faces.parents[corner // 3]
+        side = made.faces.parents[corner // (4 if quads else 3)]
         ring = CUBE_POINTS[CUBE_SIDES[side]]
         for i in range(4):
             start, end = ring[i], ring[(i + 1) % 4]
@@ -117,15 +122,16 @@ def test_both_sides_of_a_seam_divide_it_alike(levels):
     assert checked
 
 
-def test_corner_votes_take_values_that_were_there():
+@pytest.mark.parametrize("quads", [False, True])
+def test_corner_votes_take_values_that_were_there(quads):
     values = np.arange(24)[:, None]
-    carried_values, made = carried(cube(), Domain.CORNER, Rule.VOTE, values, 2)
-    sides = np.repeat(made.faces.parents, 3)
+    carried_values, made = carried(cube(), Domain.CORNER, Rule.VOTE, values, 2, quads=quads)
+    sides = np.repeat(made.faces.parents, 4 if quads else 3)
     np.testing.assert_array_equal(carried_values.ravel() // 4, sides)
 
 
 def test_quads_come_back_whole_and_outward():
-    made = compute(cube(np.inf), Choice(None, 3, quads=True))
+    made = compute(cube(np.inf), Choice(load_model(), 3))
     sizes = np.diff(made.faces.starts)
     np.testing.assert_array_equal(sizes, 4)
     ring = made.points[made.faces.vertices.reshape(-1, 4)]
@@ -219,13 +225,7 @@ def test_uv_maps_are_smoothed_as_asked(smoothing):
     shape = grid(4)
     values = shape.points[:, :2][shape.triangles].reshape(-1, 2)
     layer = Layer("UV", "FLOAT2", Domain.CORNER, Rule.BLEND, values)
-    triangles = replace(
-        shape,
-        corners=np.arange(3 * len(shape.triangles)).reshape(-1, 3),
-        polygons=np.arange(len(shape.triangles)),
-        polygon_corners=3 * np.arange(len(shape.triangles) + 1),
-        layers=(layer,),
-    )
+    triangles = replace(cut(shape), layers=(layer,))
     made = compute(triangles, Choice(None, 2, uv_smooth=smoothing))
     uv = np.zeros((len(made.points), 2))
     uv[made.faces.vertices] = made.layers[0].values

@@ -12,11 +12,14 @@ from addons.blender.pns_refine.refining.steps import (
     level_steps,
     refine_columns,
 )
-from pns_common import Creases, Mesh, load_model, loop, pns, refine, sharp_edges
+from pns_common import Mesh, catmull_clark, load_model, loop, pns, refine
 from pns_common.columns import level_topologies
 from pns_common.columns import refine_columns as refine_by_library
 from pns_common.model.file import DEFAULT_MODEL
-from tests.addons.blender.quads import cube, grid
+from pns_common.schemes import CATMULL_CLARK, LOOP
+from pns_common.sharpness import creases_by_name
+from pns_common.topology import build_topology
+from tests.addons.blender.quads import cube, cut, grid
 
 
 def points(snapshot, levels=1, **choice):
@@ -32,16 +35,14 @@ def test_a_crease_is_ten_times_its_square_and_back(crease):
 
 @pytest.mark.parametrize("model", [None, "paper", DEFAULT_MODEL])
 def test_without_creases_it_is_the_operator(model):
-    shape, model = grid(4), model and load_model(model)
-    scheme = pns(model) if model else loop()
-    expected = refine(Mesh(shape.points, shape.triangles), scheme, 2)
-    computed = compute(shape, Choice(model, 2))
+    whole, shape, model = model == DEFAULT_MODEL, grid(4), model and load_model(model)
+    scheme, mesh = pns(model) if model else loop(), shape.control(whole=whole).mesh
+    expected = refine(mesh, scheme, 2, creases=None)
+    computed = compute(shape, Choice(model, 2, crease_lines=False))
     np.testing.assert_array_equal(computed.points, expected.mesh.vertices)
     assert computed.report == expected.report
     learned = scheme.learned_levels
-    acted = (
-        expected if learned in (None, 0) else refine(Mesh(shape.points, shape.triangles), scheme, 1)
-    )
+    acted = expected if learned in (None, 0) else refine(mesh, scheme, 1, creases=None)
     np.testing.assert_array_equal(computed.ratio[: len(acted.ratio)], acted.ratio)
     assert (computed.ratio.max() > 0) == (model is not None)
 
@@ -78,17 +79,22 @@ def test_a_vertex_is_as_sharp_as_its_edges_on_average():
     np.testing.assert_allclose(points(shape)[0], 0.5 * smooth[0] + 0.5 * sharp[0])
 
 
-def test_columns_go_through_the_same_masks_as_positions():
+@pytest.mark.parametrize("base", [LOOP, CATMULL_CLARK])
+def test_columns_go_through_the_same_masks_as_positions(base):
+    model = load_model() if base.polygons else None
     for crease_sharpness in (0.0, 0.4, 1.0, 1.7, np.inf):
         shape = cube(crease_sharpness)
-        steps = level_steps(shape.triangles, 8, 2, shape.edges, shape.crease_sharpness)
-        np.testing.assert_allclose(refine_columns(shape.points, steps), points(shape, 2))
+        control = shape.control(whole=base.polygons).mesh.topology()
+        steps = level_steps(control, base, 2, shape.edges, shape.crease_sharpness)
+        made = compute(shape, Choice(model, 2, budget=0.0)).points
+        np.testing.assert_allclose(refine_columns(shape.points, steps), made, atol=1e-14)
 
 
 def test_columns_without_creases_are_those_of_the_library():
     shape = grid(3)
     columns = np.random.default_rng(0).normal(size=(len(shape.points), 4))
-    steps = level_steps(shape.triangles, len(columns), 2, shape.edges, shape.crease_sharpness)
+    control = build_topology(shape.triangles, len(columns))
+    steps = level_steps(control, LOOP, 2, shape.edges, shape.crease_sharpness)
     expected = refine_by_library(columns, level_topologies(shape.triangles, len(columns), 2))
     np.testing.assert_array_equal(refine_columns(columns, steps), expected)
 
@@ -111,12 +117,9 @@ def test_diagonals_of_flat_quads_are_never_sharp():
     assert (made.crease_sharpness > 0).sum() == 24
 
 
-@pytest.mark.parametrize(("kept", "sharp"), [(True, 24), (False, 0)])
-def test_lines_are_kept_where_the_model_asks_for_them(kept, sharp):
-    shape, model = cube(), load_model(DEFAULT_MODEL)
-    made = compute(shape, Choice(model, 1, crease_lines=kept))
-    # Of two levels one is left.
-    assert (made.crease_sharpness == 1).sum() == sharp
+@pytest.mark.parametrize("kept", [True, False])
+def test_lines_are_kept_where_the_model_asks_for_them(kept):
+    shape, model = cut(cube()), load_model(DEFAULT_MODEL)
     deep = compute(shape, Choice(model, 3, crease_lines=kept))
     assert not deep.crease_sharpness.any()
     creases = "auto" if kept else None
@@ -162,18 +165,18 @@ def test_the_report_of_a_mixture_adds_up():
 
 
 @pytest.mark.parametrize("limit", [False, True])
-@pytest.mark.parametrize("shape", [cube(), cube(0.4), grid(4)])
-def test_the_distance_is_that_to_what_loop_makes_of_the_same_mesh(shape, limit):
+@pytest.mark.parametrize("shape", [cube(), cube(0.4), grid(4), cut(cube(0.4))])
+def test_the_distance_is_that_to_what_the_plain_scheme_makes_of_the_same_mesh(shape, limit):
     made = compute(shape, Choice(load_model(DEFAULT_MODEL), 2, limit=limit))
-    by_loop = compute(shape, Choice(None, 2, limit=limit)).points
-    np.testing.assert_allclose(made.distance, np.linalg.norm(made.points - by_loop, axis=1))
+    plain = compute(shape, Choice(load_model(DEFAULT_MODEL), 2, budget=0.0, limit=limit)).points
+    np.testing.assert_allclose(made.distance, np.linalg.norm(made.points - plain, axis=1))
     assert 0 < made.distance.max() <= made.report["limit_distance"] * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("limit", [False, True])
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_lines_make_the_operators_report_and_limits_of_all_that_moves(levels, limit):
-    shape, model = cube(), load_model(DEFAULT_MODEL)
+    shape, model = cut(cube()), load_model(DEFAULT_MODEL)
     shape = type(shape)(**{**shape.__dict__, "offsets": shape.points[None].copy()})
     made = compute(shape, Choice(model, levels, limit=limit))
     mesh = Mesh(shape.points, shape.triangles)
@@ -182,18 +185,36 @@ def test_lines_make_the_operators_report_and_limits_of_all_that_moves(levels, li
     for name in ("learned_levels", "limit_distance", "limit_distance_bound"):
         assert made.report[name] == pytest.approx(expected.report[name], rel=1e-12)
     # Offsets go through the masks that place the points.
-    lines = Creases(sharp_edges(mesh), levels=2)
+    scheme = pns(model)
+    lines = creases_by_name(mesh, scheme.creases, scheme)
     by_loop = refine(mesh, loop(), levels, limit=limit, creases=lines).mesh.vertices
     np.testing.assert_allclose(made.offsets[0], by_loop, atol=1e-14)
 
 
 @pytest.mark.parametrize("limit", [False, True])
-@given(seed=st.integers(0, 1000), levels=st.integers(1, 3))
+@given(seed=st.integers(0, 1000), levels=st.integers(1, 3), whole=st.booleans())
 @settings(max_examples=20, deadline=None)
-def test_creases_that_wear_off_stay_as_near_to_plain_loop_as_the_report_says(seed, levels, limit):
+def test_creases_that_wear_off_stay_as_near_to_the_plain_scheme_as_the_report_says(
+    seed, levels, whole, limit
+):
     rng = np.random.default_rng(seed)
     shape = cube(rng.choice([0, 0.4, 1, 1.5, 2, np.inf], size=len(cube().edges)))
-    made = compute(shape, Choice(load_model(DEFAULT_MODEL), levels, limit=limit))
-    plain = refine(Mesh(shape.points, shape.triangles), loop(), levels, limit=limit).mesh.vertices
+    choice = Choice(load_model(DEFAULT_MODEL), levels, limit=limit)
+    made = compute(shape if whole else cut(shape), choice)
+    mesh, base = shape.control(whole=whole).mesh, catmull_clark() if whole else loop()
+    plain = refine(mesh, base, levels, limit=limit).mesh.vertices
     apart = np.linalg.norm(made.points - plain, axis=1).max()
     assert apart <= made.report["limit_distance"] * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("crease_sharpness", [0.0, 0.4])
+@pytest.mark.parametrize("shape", [grid(3), cut(grid(3))])
+def test_corners_of_the_boundary_stay_where_that_is_asked_for(shape, crease_sharpness):
+    shape.crease_sharpness[8] = crease_sharpness
+    corners, model = [0, 3, 12, 15], load_model()
+    kept = compute(shape, Choice(model, 2, border="corners")).points[corners]
+    smooth = compute(shape, Choice(model, 2)).points[corners]
+    alone = np.bincount(shape.control(whole=shape.has_polygons).mesh.corners)[corners] == 1
+    np.testing.assert_allclose(kept[alone], shape.points[corners][alone], atol=1e-14)
+    assert (np.linalg.norm(smooth - shape.points[corners], axis=1)[alone] > 0.01).all()
+    np.testing.assert_allclose(kept[~alone], smooth[~alone])

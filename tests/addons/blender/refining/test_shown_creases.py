@@ -17,7 +17,11 @@ LINES = Creases(angle=66.0, levels=2)
 
 def hard_edges_alone(shape):
     """What is kept where nothing turns so much that it is a line."""
-    return shown_creases(shape, keeping(Creases(angle=179.0))).named
+    return shown(shape, keeping(Creases(angle=179.0))).named
+
+
+def shown(shape, scheme):
+    return shown_creases(shape, shape.control(whole=False), scheme)
 
 
 def keeping(creases):
@@ -57,12 +61,12 @@ def test_the_edges_of_a_flat_face_are_hard_and_its_diagonal_is_not():
 
 def test_they_are_kept_beside_lines_for_as_many_levels_and_only_where_lines_are_asked_for():
     shape, middle = with_sharp_middle()
-    made, of_cube = (shown_creases(each, keeping(LINES)) for each in (shape, cube()))
+    made, of_cube = (shown(each, keeping(LINES)) for each in (shape, cube()))
     assert made.named is not None
     assert of_cube.named is not None
     assert (len(made.named), made.levels) == (len(middle), 2)
     assert len(of_cube.named) == 12
-    assert shown_creases(shape, loop()).named is None
+    assert shown(shape, loop()).named is None
 
 
 @pytest.mark.parametrize(("kept", "sharp"), [(True, 2 * CELLS), (False, 0)])

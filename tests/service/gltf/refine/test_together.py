@@ -227,9 +227,9 @@ def test_one_mesh_without_a_face_does_not_send_the_others_alone(
     alone: list[int] = []
     original = meshes.refine_alone
 
-    def counted(plan: MeshPlan, *rest: object) -> object:
+    def counted(plan: MeshPlan, *rest: Any, **named: Any) -> object:
         alone.append(plan.mesh)
-        return original(plan, *rest)
+        return original(plan, *rest, **named)
 
     monkeypatch.setattr(meshes, "refine_alone", counted)
     flat = octahedron(indices=np.array([[0, 0, 1]] * 8))
