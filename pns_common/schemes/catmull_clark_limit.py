@@ -89,7 +89,9 @@ def _limits_of_three(
     limits = sums[:, :WIDTH].copy()
     if sharp is None:
         return limits
-    darts = np.flatnonzero((mesh.sharp_count == DART) & (sums[:, WIDTH] >= kernels.LEAST_CORNERS))
+    # Without an edge of sharpness 1 nothing is counted.
+    darts = np.flatnonzero(mesh.sharp_count == DART)
+    darts = darts[sums[darts, WIDTH] >= kernels.LEAST_CORNERS]
     if len(darts):
         weight = sums[:, WIDTH] ** 2
         limits[darts] = _dart_limits(placed, weight, mesh)[darts]

@@ -16,7 +16,7 @@ from service.cli.errors import explained
 from service.meshfiles.example import part_glb
 from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
 
-NAMES = ", ".join(bundled_models())
+NAMES = ", ".join(bundled_models(companions=True))
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_creases_are_found_in_each_mesh_by_itself(
 
     together = made()
     edges = [mesh["levels"][0]["edges"] for mesh in together.report["meshes"]]
-    assert [counts.get("crease", 0) for counts in edges] == [18, 0, 0, 0, 0]
+    assert [counts.get("soft", 0) for counts in edges] == [18, 0, 0, 0, 0]
     monkeypatch.setattr(meshes, "MOST_FACES", -1)
     alone = made()
     assert together.report == alone.report
