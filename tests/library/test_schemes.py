@@ -12,7 +12,7 @@ from pns_common.base_scheme import BaseScheme
 from pns_common.model.file import bundled_models
 from pns_common.topology import split_triangles
 from tests.support.meshes import bumpy_sphere, grid
-from tests.support.networks import Float64Model, default_model, random_layers
+from tests.support.networks import Float64Model, default_model, random_layers, sharpening_model
 from tests.support.polygons import mixed_cube
 
 
@@ -47,7 +47,7 @@ def test_each_number_of_a_card_reaches_its_place_in_the_rule():
         "network_scale": 0.3,
         "fold_angle": 60.0,
     }
-    scheme = pns(default_model(0, **numbers, sharpness_levels=3), 4)
+    scheme = pns(sharpening_model(0, **numbers, sharpness_levels=3), 4)
     rule = scheme.rule
     named = {name: getattr(rule, name) for name in numbers if name != "boundary_strength"}
     assert named | {"boundary_strength": rule.curve_strength} == numbers
