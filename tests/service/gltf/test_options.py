@@ -82,9 +82,10 @@ def test_sharp_edges_are_kept_where_the_model_asks(options, count):
     given = [[box()], [box()]]  # two meshes, which are refined together
     result = subdivide_gltf(files.glb(*given), "glb", Options(**options), load_model(), Limits())
     for mesh in result.report["meshes"]:
-        assert mesh["levels"][0]["edges"].get("crease", 0) == count
+        assert mesh["levels"][0]["edges"].get("soft", 0) == count
     _, attributes = files.primitive_of(result.glb)
-    assert (np.abs(attributes["POSITION"]).max(axis=1) == 1).all() == (count > 0)
+    reach = np.abs(attributes["POSITION"]).max(axis=1)
+    assert np.allclose(reach, 1, atol=1e-3) == (count > 0)
 
 
 def test_smooth_normals_and_absent_ones_make_no_crease():

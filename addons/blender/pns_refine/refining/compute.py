@@ -66,7 +66,7 @@ def compute(
     control = snapshot.control(whole=base.polygons)
     mesh, border = control.mesh, choice.border
     lines = shown_creases(snapshot, control, scheme) if choice.crease_lines else NO_CREASES
-    soft, lines = (NO_CREASES, lines) if lines.sharpness is None else (lines, NO_CREASES)
+    soft, lines = soft_and_hard(lines)
     pairs, crease_sharpness = all_creases(snapshot, control, choice.crease_angle, lines)
     cage = mesh.topology().with_border(border), base, choice.levels
     steps = level_steps(*cage, pairs, crease_sharpness, soft)
@@ -128,6 +128,15 @@ def scheme_of(
         budget = None if budget == model.card.budget else budget
         model = load_model(COMPANIONS[model.name])
     return pns(WatchedModel(model, look_up), budget)
+
+
+def soft_and_hard(lines: Creases) -> tuple[Creases, Creases]:
+    """Return lines of sharpness below 1, and those of 1, of which something may be left."""
+    if lines.named is None or lines.sharpness is None:
+        return NO_CREASES, lines
+    hard = lines.sharpness == 1
+    soft = Creases(lines.named[~hard], lines.sharpness[~hard], levels=lines.levels)
+    return soft, Creases(lines.named[hard], levels=lines.levels)
 
 
 def all_creases(
