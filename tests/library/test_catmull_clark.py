@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop, refine
-from pns_common.columns import level_topologies, refine_columns, subdivision_matrix
+from pns_common.columns import level_topologies, refine_columns
+from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
 from pns_common.quads import split_quads
 from pns_common.schemes import CATMULL_CLARK
