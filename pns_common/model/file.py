@@ -16,6 +16,7 @@ import hashlib
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import CARD_KEY, ModelCard
-from pns_common.model.session import CHUNK_ROWS, CPU, Network, OnnxModel, networks
+from pns_common.model.session import CHUNK_ROWS, CPU, Model, Network, OnnxModel, networks
 
 if TYPE_CHECKING:
     from onnx import ModelProto, NodeProto, ValueInfoProto
@@ -99,6 +100,16 @@ def bundled_models(*, companions: bool = False) -> list[str]:
     files = (entry.name for entry in BUNDLED.iterdir())
     names = {name.removesuffix(".onnx") for name in files if name.endswith(".onnx")}
     return sorted(names if companions else names - set(COMPANIONS.values()))
+
+
+def companion_of(model: Model) -> OnnxModel:
+    """Return the model that takes polygons over from one, opened once, on the same providers."""
+    return _kept(COMPANIONS[model.name], tuple(getattr(model, "providers", CPU)))
+
+
+@cache
+def _kept(name: str, providers: tuple[str, ...]) -> OnnxModel:
+    return load_model(name, providers)
 
 
 def model_from_bytes(data: bytes, name: str, providers: Sequence[str] = CPU) -> OnnxModel:

@@ -17,7 +17,8 @@ from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_COUNT
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
-from pns_common.model.file import COMPANIONS, load_model
+from pns_common.model.card import PAPER_FORMAT
+from pns_common.model.file import COMPANIONS, companion_of, load_model
 from pns_common.model.session import Model, PolygonModel
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
@@ -25,7 +26,6 @@ from pns_common.parameters import is_number
 from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
 
-PAPER_FORMAT, LEARNED_ONCE = 1, 4
 BASES = {base.name: base for base in (LOOP, CATMULL_CLARK)}
 NAMES = (LOOP.name, CATMULL_CLARK.name, "pns")
 
@@ -134,7 +134,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("model", type(model), expected="a model, as load_model() gives it")
     card = model.card
-    companion = _companion(model, budget)
+    companion = partial(_of_companion, model, budget) if model.name in COMPANIONS else None
     budget = card.budget if budget is None else budget
     if not (is_number(budget) and budget >= 0):
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
@@ -209,14 +209,8 @@ def _faces_at_unit_budget(
     return cast(PolygonModel, model).face_correction(features, 1.0)
 
 
-def _companion(model: Model, budget: float | None) -> Callable[[], Scheme] | None:
-    """Return what makes the scheme of a bundled model's companion for polygons, if it has one."""
-    name = COMPANIONS.get(model.name)
-    return None if name is None else partial(_bundled, name, budget)
-
-
-def _bundled(name: str, budget: float | None) -> Scheme:
-    return pns(load_model(name), budget)
+def _of_companion(model: Model, budget: float | None) -> Scheme:
+    return pns(companion_of(model), budget)
 
 
 def _sharpness(model: Model, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:

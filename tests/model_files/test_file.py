@@ -20,6 +20,7 @@ from pns_common.model.file import (
     MOST_NODES,
     bundled_models,
     check_file,
+    companion_of,
     load_model,
     model_from_bytes,
 )
@@ -397,3 +398,9 @@ def test_bundled_files_stay_below_half_the_limit_of_a_call(monkeypatch):
     monkeypatch.setattr(model_file, "LARGEST_CALL", LARGEST_CALL // 2)
     for name in bundled_models():
         check_file((BUNDLED / f"{name}.onnx").read_bytes(), name)
+
+
+def test_a_companion_is_opened_once_on_the_same_providers():
+    model = load_model()
+    assert companion_of(model) is companion_of(load_model())
+    assert companion_of(model).providers == model.providers

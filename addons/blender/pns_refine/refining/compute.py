@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Creases, Scheme, load_model, loop, pns, sharp_edges
+from pns_common import Creases, Scheme, loop, pns, sharp_edges
 from pns_common.creases import NO_CREASES
 from pns_common.limit import limit_positions
-from pns_common.model.file import COMPANIONS
+from pns_common.model.file import COMPANIONS, companion_of
 from pns_common.model.session import Model
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import named_scheme
@@ -126,7 +126,7 @@ def scheme_of(
     if snapshot.has_polygons and model.name in COMPANIONS:
         # A budget that was left alone is the model's own.
         budget = None if budget == model.card.budget else budget
-        model = load_model(COMPANIONS[model.name])
+        model = companion_of(model)
     return pns(WatchedModel(model, look_up), budget)
 
 
