@@ -31,13 +31,13 @@ class Limit:
     """A scheme's limit: what its masks become when they are applied for ever.
 
     Attributes:
-        positions: returns the limits of any columns of a mesh's vertices.
+        positions: returns the limits of three columns of a mesh's vertices.
         normals: returns the normals of the limit surface there.
         ring_weight: of a smooth vertex of valence k, the weight of its neighbours' mean where the
             limit is made of that and the vertex alone; None: it is not.
     """
 
-    positions: Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "V K"]] = (
+    positions: Callable[[Float[np.ndarray, "V 3"], Topology, Blocks], Float[np.ndarray, "V 3"]] = (
         field(repr=False)
     )
     normals: Callable[[Float[np.ndarray, "V 3"], Topology, Blocks], LimitNormals] = field(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base_scheme import BaseScheme, Limit
+from pns_common.base_scheme import BaseScheme, Limit, in_threes
 from pns_common.errors import ParameterError
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
@@ -25,13 +25,17 @@ def limit_positions(
         ParameterError: the scheme has no limit masks.
     """
     masks, blocks = _masks(base), blocks or Blocks()
-    limits = masks.positions(points, topology, blocks)
+
+    def by_masks(values: np.ndarray, mesh: Topology) -> np.ndarray:
+        return in_threes(values, len(values), lambda three: masks.positions(three, mesh, blocks))
+
+    limits = by_masks(points, topology)
     loops = topology.edges[topology.edges[:, 0] == topology.edges[:, 1], 0]
     if len(loops):
         # Around a face that names a vertex twice an edge may lead from a vertex to itself. The
         # next mesh does not have that edge.
         refined = base.place(points, topology, blocks)
-        limits[loops] = masks.positions(refined, base.split(topology, blocks), blocks)[loops]
+        limits[loops] = by_masks(refined, base.split(topology, blocks))[loops]
     return limits
 
 

@@ -14,9 +14,9 @@ from pns_common.kernels.connectivity import (
     following_corner,
     preceding_corner,
 )
-from pns_common.kernels.limit import NO_PLANE, add, opposed
+from pns_common.kernels.limit import add, normal_of, opposed
 from pns_common.kernels.loop import MIDPOINT
-from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over
+from pns_common.kernels.vectors import between, cross
 
 # Each of both ends and both face vertices.
 EDGE_SHARE = 1 / 4
@@ -233,11 +233,6 @@ def sector_normals(
             v = add(v, masks[row_of + j, 1], spoke)
             area = add(area, 1.0, cross(last, spoke))
             last = spoke
-        normal = cross(u, v)
-        if outwards[s] and dot(normal, area) < 0:
-            normal = -normal[0], -normal[1], -normal[2]
-        if not norm(normal) > NO_PLANE * norm(u) * norm(v):
-            normal = area
-        normal = over(normal, divisor(normal))
+        normal = normal_of(u, v, area, outwards[s])
         for k in range(3):
             to[s, k] = normal[k]

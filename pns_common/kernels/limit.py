@@ -98,14 +98,21 @@ def sector_normals(
             if j < size[s]:
                 before = preceding_corner(h, offsets, face_of_corner)
                 h = opposed(corner_edges, half_edges, edge_class, before)
-        normal = cross(u, v)
-        if outwards[s] and dot(normal, area) < 0:
-            normal = -normal[0], -normal[1], -normal[2]
-        if not norm(normal) > NO_PLANE * norm(u) * norm(v):
-            normal = area
-        normal = over(normal, divisor(normal))
+        normal = normal_of(u, v, area, outwards[s])
         for k in range(3):
             to[s, k] = normal[k]
+
+
+@inlined
+def normal_of(u, v, area, outward):
+    """Return the unit normal of tangents, on the area's side if ``outward``."""
+    # Without a plane, that of the area.
+    normal = cross(u, v)
+    if outward and dot(normal, area) < 0:
+        normal = -normal[0], -normal[1], -normal[2]
+    if not norm(normal) > NO_PLANE * norm(u) * norm(v):
+        normal = area
+    return over(normal, divisor(normal))
 
 
 @inlined

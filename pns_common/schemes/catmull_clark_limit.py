@@ -36,7 +36,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base_scheme import WIDTH, in_threes
+from pns_common.base_scheme import WIDTH
 from pns_common.kernels import catmull_clark as kernels
 from pns_common.kernels import loop
 from pns_common.parallel import Blocks
@@ -69,15 +69,9 @@ def eigenvalue(theta: float) -> float:
 
 
 def limit_positions(
-    points: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
-) -> Float[np.ndarray, "V K"]:
-    """Return the limits of any columns."""
-    return in_threes(points, len(points), lambda three: _limits_of_three(three, topology, blocks))
-
-
-def _limits_of_three(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
+    """Return the limits of three columns."""
     mesh, count, sharp = topology, topology.vertex_count, topology.sharpest
     placed = place(points, replace(mesh, soft=NO_WEIGHTS), blocks)
     read = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges, mesh.corner_reach
@@ -177,7 +171,7 @@ def _closed_mode(turn: np.ufunc, k: int) -> Float[np.ndarray, " N"]:
     """Return the weights of a closed fan's tangent; e_k, which is e_0, has none."""
     theta = 2 * np.pi / k
     if k == 2:  # both shrink by 1/4: the spokes apart, and the opposite corners
-        spokes, diagonals = np.array([[1, -1, 0], [0, 0, 0]]), np.array([[0, 0], [1, -1]])
+        spokes, diagonals = np.array([[1.0, -1, 0], [0, 0, 0]]), np.array([[0.0, 0], [1, -1]])
         which = 0 if turn is np.cos else 1
         return _woven(spokes[which], diagonals[which])
     values = turn(theta * np.arange(k + 1))

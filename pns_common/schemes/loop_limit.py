@@ -36,7 +36,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.base_scheme import WIDTH, in_threes
+from pns_common.base_scheme import WIDTH
 from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
 from pns_common.parallel import Blocks
@@ -81,15 +81,9 @@ def limit_normals(
 
 
 def limit_positions(
-    points: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
-) -> Float[np.ndarray, "V K"]:
-    """Return the limits of any columns."""
-    return in_threes(points, len(points), lambda three: _limits_of_three(three, topology, blocks))
-
-
-def _limits_of_three(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
+    """Return the limits of three columns."""
     count, sharp = topology.vertex_count, topology.sharpest
     limits, valence = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
     blocks.owners(count).run(
