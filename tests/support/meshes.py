@@ -65,26 +65,6 @@ def bent(x, y):
     return 0.4 * np.exp(-6 * (x + 0.3 * y) ** 2) + 0.1 * np.sin(3 * y)
 
 
-def proper_faces(mesh):
-    """A mesh without faces that name a vertex twice, or the same three as an earlier one."""
-    three = np.sort(mesh.faces, axis=1)
-    distinct = (np.diff(three, axis=1) > 0).all(axis=1)
-    _, first = np.unique(three, axis=0, return_index=True)
-    kept = distinct & np.isin(np.arange(len(three)), first)
-    return Mesh(mesh.vertices, mesh.faces[kept]) if kept.any() else Mesh(*icosphere(0))
-
-
-def torus_of_quads(around, across):
-    """Its quads are plane, and all cut the same way."""
-    u, v = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in (around, across)), indexing="ij")
-    radius = 1 + 0.4 * np.cos(v)
-    points = np.stack([radius * np.cos(u), radius * np.sin(u), 0.4 * np.sin(v)], axis=-1)
-    i, j = (axis.ravel() for axis in np.mgrid[:around, :across])
-    next_i, next_j = (i + 1) % around, (j + 1) % across
-    a, b, c, d = i * across + j, next_i * across + j, next_i * across + next_j, i * across + next_j
-    return points.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
-
-
 def bow_tie():
     """Two triangles that share one vertex only."""
     vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0.5], [-1, -1, 0]]
@@ -103,23 +83,6 @@ def one_way_pair():
     return np.array(vertices, dtype=float), np.array([[0, 1, 2], [0, 1, 3]])
 
 
-def folded_sheet(n=4):
-    """A sheet bent as an arc and closed by a second one that lies on it, cut along other diagonals.
-
-    Both share their rim, whose edges have no frame: their faces look opposite ways.
-    """
-    flat, faces = grid(n)
-    x, y = flat[:, 0], flat[:, 1]
-    points = np.stack([np.sin(x), y, np.cos(x)], axis=1)
-    inside = np.flatnonzero(np.abs(flat[:, :2]).max(axis=1) < np.abs(flat[:, :2]).max())
-    other = np.arange(len(points))
-    other[inside] = len(points) + np.arange(len(inside))
-    first, second = np.split(faces, 2)
-    (a, b, c), d = first.T, second[:, 2]
-    below = other[np.concatenate([np.c_[d, b, a], np.c_[d, c, b]])]
-    return np.concatenate([points, points[inside]]), np.concatenate([faces, below])
-
-
 def every_edge_class():
     """Vertices and faces by name: small meshes that together have each class of edge."""
     return {
@@ -129,19 +92,6 @@ def every_edge_class():
         "three pages": three_pages(),
         "one-way pair": one_way_pair(),
         "isolated vertex": (np.vstack([grid(3)[0], [[9, 9, 9]]]), grid(3)[1]),
-    }
-
-
-def face_lists():
-    """Faces by name: closed, open, and what no surface has; one in Fortran's order."""
-    return {
-        "closed": bumpy_sphere(0, subdivisions=2)[1],
-        "open": grid(4)[1],
-        "column by column": np.asfortranarray(grid(4)[1]),
-        "bow-tie": bow_tie()[1],
-        "three pages": three_pages()[1],
-        "one-way pair": one_way_pair()[1],
-        "irregular": np.random.default_rng(0).integers(0, 9, (40, 3)),
     }
 
 
@@ -227,11 +177,6 @@ def block(cells=3, noise=0.0, seed=0, closed=True):
     rng = np.random.default_rng(seed)
     points = sides[first] + noise * rng.standard_normal((len(first), 3))
     return points, number.reshape(-1)[np.concatenate(faces)]
-
-
-def noisy_blocks():
-    """Blocks whose vertices lie beside their sides, more and more; every other one has no lid."""
-    return st.sampled_from([Mesh(*block(3, noise=0.2 * k, closed=k % 2 == 0)) for k in range(4)])
 
 
 def prism(profile):

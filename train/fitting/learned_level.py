@@ -76,7 +76,7 @@ class LearnedLevel:
         degenerate: which of those have no frame.
         at_edges, at_vertices: what surrounds both networks; γ of edges is their own part.
         push: d of vertices away from curves.
-        rule: the library's, for its numbers.
+        numbers: of the library's rule, by name.
     """
 
     level: Level
