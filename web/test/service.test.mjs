@@ -72,8 +72,10 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("a service that goes away at work, in words, with another try", async () => {
     await with_({}, async ({ page, server }) => {
+      // As soon as the page follows the job, seconds before it is done.
+      const followed = page.waitForResponse((answer) => answer.url().endsWith("/events"));
       await choose(page, example);
-      await page.waitForFunction(() => /Refining/.test(document.querySelector("#work-text").textContent));
+      await followed;
       await server.kill();
       await page.locator("#problem").waitFor();
       assert.equal(await page.textContent("#problem-title"), "The connection broke");
