@@ -19,6 +19,7 @@ UvRule = Literal["linear", "smooth"]
 NormalRule = Literal["auto", "keep", "smooth", "limit"]
 WeldRule = Literal["position", "index", "off"]
 BorderRule = Literal["smooth", "corners", "fixed"]
+PolygonRule = Literal["auto", "off"]
 Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
@@ -35,8 +36,8 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface; `material` and `group` name the faces to refine (None: all).
-    Raises InvalidParameter.
+    vertices on the limit surface; `polygons` joins triangles of a glTF; `material` and `group` name
+    the faces to refine (None: all). Raises InvalidParameter.
     """
 
     levels: int = DEFAULT_LEVELS
@@ -50,6 +51,7 @@ class Options:
     weld: WeldRule = "position"
     weld_tolerance: float = 0.0
     border: BorderRule = "smooth"
+    polygons: PolygonRule = "auto"
     material: str | None = None
     group: str | None = None
     compress: Compression = "none"
@@ -67,6 +69,7 @@ class Options:
         check_choice("normals", self.normals, get_args(NormalRule))
         check_choice("weld", self.weld, get_args(WeldRule))
         check_choice("border", self.border, get_args(BorderRule))
+        check_choice("polygons", self.polygons, get_args(PolygonRule))
         if self.normals == "limit" and not self.limit:
             raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):

@@ -70,6 +70,7 @@ def build_report(
     bends = Bends(*(sum(each) for each in zip(*(astuple(r.bends) for r in results), strict=True)))
     return {
         "scheme": scheme.name,
+        "base": scheme.base.name,
         "budget": scheme.budget,
         "model": scheme.model,
         "model_hash": scheme.model_hash,

@@ -398,3 +398,12 @@ def split_edges(
             to_face_edges[4 * f + i, 1] = inner
             to_face_edges[4 * f + i, 2] = into
             to_face_edges[4 * f + 3, before] = inner
+
+
+@kernel
+def pair_up(first, second, free, chosen):
+    """Choose pairs in their order, each of two things that are free; they are free no longer."""
+    for n in range(len(first)):
+        if free[first[n]] and free[second[n]]:
+            free[first[n]] = free[second[n]] = False
+            chosen[n] = True

@@ -16,6 +16,7 @@ from ..options import (
     Diagnostics,
     NormalRule,
     Options,
+    PolygonRule,
     SchemeName,
     UvRule,
     WeldRule,
@@ -73,6 +74,7 @@ DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carrie
 UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
 NormalsOption = Annotated[
     NormalRule,
+    PolygonRule,
     typer.Option(
         help="auto: those of the file; where a mesh has none, smooth but across sharp edges. "
         "keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
@@ -99,6 +101,13 @@ BorderOption = Annotated[
     typer.Option(
         help="boundaries. smooth: curves. corners: curves that end at vertices of one face. "
         "fixed: as they are"
+    ),
+]
+PolygonsOption = Annotated[
+    PolygonRule,
+    typer.Option(
+        help="triangles of a glTF. auto: joined to the quads that most of them are halves of, for "
+        "Catmull-Clark. off: refined as they are"
     ),
 ]
 MaterialOption = Annotated[

@@ -22,6 +22,9 @@ COLUMNS = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 SURFACES = (TRIANGLES, STRIP, FAN)
 
+# Says which successive triangles are one polygon: those that begin with one vertex.
+NGONS = "FB_ngon_encoding"
+
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 # The magic word of a GLB is bodies.media.GLB_MAGIC.

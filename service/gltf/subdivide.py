@@ -17,13 +17,15 @@ from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
 from .read.container import write_glb
 from .read.json_text import encode
-from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS
+from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
+from .read.plan import BYTES_PER_FACE as BYTES_PER_FACE_OF_MESH
 from .read.references import mesh_instances
 from .read.upload import Media, Upload, read_upload
-from .refine.meshes import refined_meshes
+from .refine.meshes import mostly_polygons, refined_meshes
 from .write.compression import BYTES_PER_FACE, WRITERS
 from .write.prune import VertexUse
 from .write.storage import (
+    leave_out_ngons,
     put_report,
     remove_replaced,
     replaces_extras,
@@ -83,6 +85,11 @@ def subdivide_gltf(
         if options.limit:
             packing += BYTES_FOR_LIMIT
         upload = read_upload(data, media, options.levels, limits, siblings, packing)
+        scheme = _for_polygons(upload, scheme, options)
+        if scheme.base.polygons:
+            # A triangle alone becomes six, where Loop's scheme makes four.
+            more = packing + (BYTES_PER_FACE_OF_MESH + packing) // 2
+            check_cost(upload.document, upload.plans, len(data), options.levels, limits, more)
         instances = mesh_instances(upload.document)
         changes = [*losses, *_changes_of_container(upload, options)]
         changes += upload.changes + storage_changes(upload.document, upload.plans)
@@ -114,7 +121,9 @@ def subdivide_gltf(
                         report=mesh.report,
                         bends=mesh.bends,
                     )
-                    outcomes[mesh.index] = result, mesh.changes
+                    refined = (primitive.source.number for primitive in mesh.refined)
+                    left_out = leave_out_ngons(upload.tree, mesh.index, refined)
+                    outcomes[mesh.index] = result, mesh.changes + left_out
     results, found = zip(*(outcomes[plan.mesh] for plan in upload.plans), strict=True)
     changes += chain.from_iterable(found)
 
@@ -134,17 +143,30 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
     """Return the scheme that the options name for triangles.
 
     Raises:
-        InvalidParameter: `scheme=catmull-clark`, which makes no triangles.
         NoModelError: a model is asked for, and there is none.
     """
     if options.scheme == "loop":
         return loop()
     if options.scheme == "catmull-clark":
-        reason = "catmull-clark refines polygons, of OBJ, PLY, STL and OFF: a glTF has triangles"
-        raise InvalidParameter("scheme", reason)
+        return catmull_clark()
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
     return pns(model, options.budget)
+
+
+def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
+    """Return the scheme for a file: a companion for polygons if that is what its triangles are.
+
+    Raises:
+        InvalidParameter: Catmull–Clark is asked for some of the faces.
+    """
+    if options.selects:
+        if scheme.base.polygons:
+            raise InvalidParameter("scheme", "catmull-clark refines all faces of a glTF, or none")
+        return scheme
+    if options.polygons == "auto" and scheme.for_polygons is not None and mostly_polygons(upload):
+        return scheme.for_polygons()
+    return scheme
 
 
 def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:

@@ -19,6 +19,7 @@ from ..options import (
     Diagnostics,
     NormalRule,
     Options,
+    PolygonRule,
     SchemeName,
     UvRule,
     WeldRule,
@@ -117,6 +118,12 @@ class Parameters(BaseModel):
         default=DEFAULTS.border,
         description="what boundaries do: `smooth`, they become curves; `corners`, these end at "
         "vertices of one face alone; `fixed`, boundaries stay as they are",
+    )
+    polygons: PolygonRule = Field(
+        default=DEFAULTS.polygons,
+        description="`auto`: where most triangles of a glTF are halves of quads, or parts of "
+        "polygons by FB_ngon_encoding, these are refined by Catmull-Clark; `off`: triangles are "
+        "refined as they are",
     )
     material: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=DEFAULTS.material,

@@ -1,4 +1,4 @@
-"""Texture coordinates: linear, or refined by Loop's stencil inside the charts that they form."""
+"""Texture coordinates: linear, or refined by the masks of a scheme inside the charts they form."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from pns_common.columns import level_topologies
 from pns_common.creases import NO_CREASES, Creases
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
-from pns_common.schemes import LOOP
-from pns_common.topology import EdgeClass, Topology, split_faces
+from pns_common.schemes import LOOP, BaseScheme
+from pns_common.topology import EdgeClass, Topology
 
 from ..options import Options
+from .quad_grid import at_quad_points
 from .split_connectivity import SplitConnectivity
 
 # How C corners at vertices (C,) of the mesh to refine spread their texture coordinates (C, 2) over
@@ -26,9 +27,12 @@ UvBlend = Callable[
 ]
 
 
-def uv_blend(options: Options, creases: Creases) -> UvBlend:
-    """Return the rule that the options name; `creases` are named edges of the mesh to refine."""
-    return partial(smooth_uv, creases=creases) if options.uv == "smooth" else linear_uv
+def uv_blend(options: Options, creases: Creases, base: BaseScheme = LOOP) -> UvBlend:
+    """Return the rule that the options name; `creases` are named edges of the mesh to refine.
+
+    Pairs of triangles are quads to a base scheme of polygons.
+    """
+    return partial(smooth_uv, creases=creases, base=base) if options.uv == "smooth" else linear_uv
 
 
 def linear_uv(
@@ -43,36 +47,66 @@ def smooth_uv(
     vertex: Int[np.ndarray, " C"],
     uv: Shaped[np.ndarray, "C 2"],
     creases: Creases,
+    base: BaseScheme = LOOP,
 ) -> Float[np.ndarray, "N 2"]:
-    """Blend by Loop's stencil inside charts; seams and the charts' boundaries stay linear.
+    """Blend by the base scheme's masks inside charts; see `refined_charts`."""
+    grid, faces = connectivity.grid, connectivity.faces
+    levels = grid.segments.bit_length() - 1
+    if levels == 0:
+        return connectivity.linear(uv)
+    if base.polygons:
+        faces = faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
+    flat, degree = faces.reshape(-1), faces.shape[1]
+    offsets = np.arange(0, len(flat) + 1, degree)
+    columns, refined = refined_charts(uv[flat], vertex[flat], offsets, levels, creases, base)
+    descendants = refined.reshape(len(faces), -1)
+    at_points = (
+        at_quad_points(descendants, levels)
+        if base.polygons
+        else np.take(descendants, grid.slot, axis=1)
+    )
+    return columns[connectivity.at_vertices(at_points)]
+
+
+def refined_charts(
+    uv: Shaped[np.ndarray, "H 2"],
+    vertex: Int[np.ndarray, " H"],
+    offsets: Int[np.ndarray, " F1"],
+    levels: int,
+    creases: Creases,
+    base: BaseScheme = LOOP,
+) -> tuple[Float[np.ndarray, "N 2"], Int[np.ndarray, "G K"]]:
+    """Refine values at the corners of faces by the masks inside charts; seams and rims stay linear.
 
     A chart is a piece of the surface within which texture coordinates are continuous: corners are
     one where vertex and coordinates are. Creases inside it are creases of its stencil too, at the
-    levels at which they are sharp, so that textures lie beside them as they lay.
+    levels at which they are sharp, so that textures lie beside them as they lay. Returns the
+    refined values, and those of the corners of the refined faces.
     """
     corner = distinct_rows(np.hstack([as_words(vertex[:, None]), as_words(uv)]))
-    flat, first = number_by_first_appearance(corner[connectivity.faces.reshape(-1)])
-    corner_of = connectivity.faces.reshape(-1)[first]
-    columns, faces = uv[corner_of].astype(np.float64), flat.reshape(-1, 3)
-    grid = connectivity.grid
-    levels = grid.segments.bit_length() - 1
-    sharp = _in_charts(creases, faces, vertex[corner_of])
+    flat, first = number_by_first_appearance(corner)
+    columns = uv[first].astype(np.float64)
+    sharp = _in_charts(creases, flat, offsets, vertex[first])
     blocks = Blocks(available_threads())
-    topologies = level_topologies(faces, len(columns), levels, sharp, blocks=blocks)
+    topologies = level_topologies((flat, offsets), len(columns), levels, sharp, base, blocks)
     for topology in topologies:
-        columns = _refined(columns, topology, blocks)
-    descendants = split_faces(topologies[-1], blocks, np.int64).reshape(len(faces), -1)
-    return columns[connectivity.at_vertices(np.take(descendants, grid.slot, axis=1))]
+        columns = _refined(columns, topology, blocks, base)
+    return columns, base.faces(topologies[-1], blocks, np.int64)
 
 
 def _in_charts(
-    creases: Creases, faces: Int[np.ndarray, "F 3"], vertex: Int[np.ndarray, " P"]
+    creases: Creases,
+    corners: Int[np.ndarray, " H"],
+    offsets: Int[np.ndarray, " F1"],
+    vertex: Int[np.ndarray, " P"],
 ) -> Creases:
     """Return the sides of faces over points of charts that lie on named pairs of vertices."""
     named = creases.named
     if named is None or len(named) == 0:
         return NO_CREASES
-    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    follow = np.arange(1, len(corners) + 1)
+    follow[offsets[1:] - 1] = offsets[:-1]
+    sides = np.stack([corners, corners[follow]], axis=1)
     count = int(max(vertex.max(), named.max())) + 1
     ends, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (vertex[sides], named))
     kept = np.isin(ends, wanted)
@@ -85,10 +119,10 @@ def _in_charts(
 
 
 def _refined(
-    columns: Float[np.ndarray, "V 2"], topology: Topology, blocks: Blocks
+    columns: Float[np.ndarray, "V 2"], topology: Topology, blocks: Blocks, base: BaseScheme
 ) -> Float[np.ndarray, "W 2"]:
-    """Refine by Loop's masks; vertices on a boundary stay, as in linear blending."""
+    """Refine by the base scheme's masks; vertices on a boundary stay, as in linear blending."""
     rim = (topology.edge_class != EdgeClass.INTERIOR) & (topology.edge_class != EdgeClass.CREASE)
-    at_rim, refined = topology.edges[rim].reshape(-1), LOOP.place(columns, topology, blocks)
+    at_rim, refined = topology.edges[rim].reshape(-1), base.place(columns, topology, blocks)
     refined[at_rim] = columns[at_rim]
     return refined

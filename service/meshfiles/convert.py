@@ -226,6 +226,8 @@ def converted(
         mesh, polygons = _taken(read_within(data, kind, limits), options, model)
     if target in GLTF_KINDS and polygons is None:
         sent = as_gltf(mesh, siblings, options)
+        # Files of polygons have them: what comes as triangles stays triangles.
+        options = replace(options, polygons="off")
         return _by_gltf(sent, target, options, model, limits, course)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)

@@ -16,11 +16,15 @@ from ..gltf.read.primitives import read_primitive
 from ..gltf.read.upload import read_upload
 from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.write.compression import WRITERS
-from ..gltf.write.storage import put_report, remove_replaced
+from ..gltf.write.storage import (
+    leave_out_ngons,
+    put_report,
+    remove_replaced,
+    withdraw_unused,
+)
 from ..options import Limits, Options
 from .mesh_file import MATERIAL, Labels, Layer, MeshFile
 from .to_gltf import as_gltf
-from .triangles_glb import NGONS
 
 # Which corners of a quad its two triangles have, by the corner that both begin with.
 FANS = np.array([[k, (k + 1) % 4, (k + 2) % 4, k, (k + 2) % 4, (k + 3) % 4] for k in range(4)])
@@ -41,6 +45,8 @@ def polygons_glb(
     sent = as_gltf(_as_triangles(mesh), siblings, options, ngons=True)
     upload = read_upload(sent.data, "glb", 0, limits, sent.siblings)
     writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
+    # The first corner of a triangle counts.
+    writer.in_order = True
     if options.compress != "none":
         (plan,) = upload.plans
         parts = [read_primitive(upload.document, upload.buffers, 0, n) for n in plan.primitives]
@@ -51,9 +57,8 @@ def polygons_glb(
     primitives = upload.tree["meshes"][0]["primitives"]
     if options.compress == "draco":
         # It orders triangles anew.
-        upload.tree["extensionsUsed"].remove(NGONS)
-        for primitive in primitives:
-            del primitive["extensions"][NGONS]
+        changes += leave_out_ngons(upload.tree, 0, range(len(primitives)))
+        withdraw_unused(upload.tree)
     totals = report["totals"] | {"primitives": len(primitives)}
     report = report | {
         "totals": totals,

@@ -15,6 +15,7 @@ from ..gltf.constants import (
     ARRAY_BUFFER,
     COMPONENT_TYPES,
     ELEMENT_ARRAY_BUFFER,
+    NGONS,
     UNSIGNED_INT,
 )
 from ..gltf.read.container import read_glb, write_glb
@@ -25,7 +26,6 @@ from .mesh_file import COLOUR, NONE, NORMAL, UV, MeshFile
 from .parts import Part, parts_of
 
 _TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items() if number != UNSIGNED_INT}
-NGONS = "FB_ngon_encoding"
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 

@@ -44,7 +44,7 @@ export async function resultOf(order: Order, answer: Answer): Promise<Result> {
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
     ...order,
-    classic: polygons ? "catmull-clark" : "loop",
+    classic: report.base,
     key: query(order.asked.settings, order.classic).toString(),
     bytes: answer.bytes,
     json,

@@ -12,7 +12,7 @@ from jaxtyping import Int, Shaped
 from pns_common.rows import as_words, distinct_rows, marked, number_by_first_appearance
 
 from ...errors import GltfError, UnsupportedFeature
-from ..constants import FAN, FLOAT, TRIANGLES
+from ..constants import FAN, FLOAT, NGONS, TRIANGLES
 from .accessors import dequantised, read, read_rows
 from .schema import Accessor, Document
 
@@ -32,6 +32,7 @@ class TrianglePrimitive:
         targets: for each morph target, arrays by name that are added to the attributes.
         target_accessors: for each morph target, descriptions by name.
         positions: the number of the accessor of positions, whose elements `rows` are.
+        ngons: whether successive triangles that begin with one vertex are one polygon.
     """
 
     number: int
@@ -42,6 +43,7 @@ class TrianglePrimitive:
     targets: tuple[dict[str, Shaped[np.ndarray, "N K"]], ...] = ()
     target_accessors: tuple[dict[str, Accessor], ...] = ()
     positions: int = 0
+    ngons: bool = False
 
     @property
     def is_double(self) -> bool:
@@ -91,6 +93,7 @@ def read_primitive(
         targets=tuple(values for values, _ in targets),
         target_accessors=tuple(described for _, described in targets),
         positions=primitive.attributes["POSITION"],
+        ngons=NGONS in primitive.extensions and primitive.mode == TRIANGLES,
     )
 
 

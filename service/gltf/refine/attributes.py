@@ -87,9 +87,14 @@ def refined_primitives(
     uv_blend: UvBlend,
     course: Course,
     cut: Cut | None = None,
+    ids: Int[np.ndarray, "P T"] | None = None,
 ) -> list[RefinedPrimitive]:
-    """Return the refined primitives; primitives without faces are left out."""
-    ids = refined_ids(control.weld, control.cleaned, refined.mesh, grid)
+    """Return the refined primitives; primitives without faces are left out.
+
+    `ids` are the refined vertices at the grid points of the kept faces, if they are known.
+    """
+    if ids is None:
+        ids = refined_ids(control.weld, control.cleaned, refined.mesh, grid)
     ends = slices(control.kept_counts)
     if cut is not None:
         refined = with_still(refined, control, cut, ids, grid)
@@ -197,9 +202,9 @@ def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvB
         elif name in skin:
             refined[name] = skin[name]
         elif name.startswith("TEXCOORD_"):
-            refined[name] = _in_type_of(values, uv_blend(own, vertices.vertex, corners))
+            refined[name] = in_type_of(values, uv_blend(own, vertices.vertex, corners))
         else:
-            refined[name] = _blend(name, own, corners, primitive.accessors[name])
+            refined[name] = blend(name, own, corners, primitive.accessors[name])
     return refined
 
 
@@ -238,11 +243,11 @@ def _target(
             morphed = _tangents(directions, vertices.exact_normals if under is None else under)
             refined[name] = (morphed - base[name][:, :3]).astype(np.float32)
         else:
-            refined[name] = _blend(name, own, corners, primitive.target_accessors[number][name])
+            refined[name] = blend(name, own, corners, primitive.target_accessors[number][name])
     return refined
 
 
-def _blend(
+def blend(
     name: str, own: SplitConnectivity, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
 ) -> Shaped[np.ndarray, "N K"]:
     """Return linear blends; of identifiers and other whole numbers, values of nearest corners."""
@@ -250,7 +255,7 @@ def _blend(
     whole = corners.dtype.kind != "f" and not fraction
     if whole or _IDENTIFIER.fullmatch(name):
         return own.nearest(corners)
-    return _in_type_of(corners, own.linear(corners))
+    return in_type_of(corners, own.linear(corners))
 
 
 def _tangents(
@@ -262,7 +267,7 @@ def _tangents(
     return perpendicular_tangents(directions, normals, Blocks(available_threads()))
 
 
-def _in_type_of(
+def in_type_of(
     old: Shaped[np.ndarray, "C K"], blended: Float[np.ndarray, "N K"]
 ) -> Shaped[np.ndarray, "N K"]:
     """Return blended values in a component type; integers are rounded, in place."""

@@ -18,6 +18,7 @@ from jaxtyping import Float, Int, Shaped
 from pns_common.columns import ColumnRefinement
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import as_words, distinct_rows
+from pns_common.schemes import LOOP, BaseScheme
 from pns_common.topology import Topology
 from pns_common.weights import keep_heaviest, scale_rows, whole_units
 
@@ -166,16 +167,17 @@ def refined_skin_and_morph(
     options: Options,
     course: Course,
     parts: Parts | None = None,
+    base: BaseScheme = LOOP,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
     """Refine skin and morph; return also the number of vertices of each part that lost a joint.
 
-    `topologies` are those of the meshes that were refined, level by level.
+    `topologies` are those of the meshes that were refined, level by level, by a base scheme.
     """
     if not control.skin_and_morph.any:
         return control.skin_and_morph, np.zeros(1, dtype=np.int64)
     mesh, rows = control.mesh, control.vertex_rows()
     before = control.skin_and_morph.take(rows)
-    linear = ColumnRefinement(topologies, limit=options.limit, blocks=Blocks(available_threads()))
+    linear = ColumnRefinement(topologies, base, options.limit, Blocks(available_threads()))
     slots = _common_slots(control, refined_faces, linear.count)
     if parts is None:
         after = _refined(before, linear, slots, course)
@@ -279,11 +281,13 @@ def _common_slots(
     if min(slots) == max(slots):
         return None
     of_kept = np.repeat(slots, control.kept_counts)
-    of_face = np.full(len(control.mesh.faces), max(slots))
+    of_face = np.full(control.surface.face_count, max(slots))
     # Copies of a face share its refined vertices.
-    np.minimum.at(of_face, control.cleaned.representative[np.concatenate(control.kept)], of_kept)
+    np.minimum.at(of_face, control.face_of_kept, of_kept)
     at_vertices = np.full(count, max(slots))
-    # Descendants are ordered like their faces.
+    # Descendants are ordered like their faces, of polygons like their corners.
+    if control.polygons is not None:
+        of_face = np.repeat(of_face, np.diff(control.surface.offsets))
     children = np.repeat(of_face, len(refined_faces) // len(of_face))
     np.minimum.at(at_vertices, refined_faces, children[:, None])
     return at_vertices

@@ -21,6 +21,7 @@ from ...meshes.weld_tolerance import WHOLE, weld_within
 from ...options import Options
 from ..read.primitives import TrianglePrimitive
 from .columns import SkinAndMorph, read_skin_and_morph
+from .polygons import Found, Polygons, polygons_of
 
 # Exporters compute the two sides of a UV seam apart and round differently, in real files by up to
 # about 0.01°. Normals within 0.1° are one; hard edges have degrees.
@@ -74,6 +75,8 @@ class ControlMesh:
         skin_and_morph: of the rows of all primitives.
         near: (P,) for each part, the number of unequal vertices that were joined.
         authored: whether the normals are the file's.
+        polygons: what its triangles are refined as; None: as triangles.
+        own: (N,) the share of each row's normal that is its author's own; None: not found yet.
     """
 
     primitives: Sequence[TrianglePrimitive]
@@ -84,6 +87,8 @@ class ControlMesh:
     skin_and_morph: SkinAndMorph
     near: Int[np.ndarray, " P"]
     authored: bool = True
+    polygons: Polygons | None = None
+    own: Float[np.ndarray, " N"] | None = None
 
     @property
     def is_empty(self) -> bool:
@@ -101,6 +106,18 @@ class ControlMesh:
     def mesh(self) -> Mesh:
         """The mesh to refine. Raises ValueError if no face is left."""
         return self.cleaned.mesh
+
+    @property
+    def surface(self) -> Mesh:
+        """The mesh to refine, of polygons where its triangles are joined."""
+        return self.mesh if self.polygons is None else self.polygons.mesh
+
+    @property
+    def face_of_kept(self) -> Int[np.ndarray, " P"]:
+        """The face of the mesh to refine that each kept triangle, or what it copies, is part of."""
+        if self.polygons is not None:
+            return self.polygons.of_kept
+        return self.cleaned.representative[np.concatenate(self.kept)]
 
     @property
     def copies(self) -> int:
@@ -138,6 +155,13 @@ class ControlMesh:
         row = np.empty(len(self.weld.points), dtype=np.int64)
         row[self.weld.vertex_of[used]] = used
         return row[self.cleaned.vertex_map >= 0]
+
+    def joined(self, found: Sequence[Found]) -> ControlMesh:
+        """Return a copy whose triangles are refined as the polygons found in its primitives."""
+        if self.is_empty:
+            return self
+        kept = self.cleaned.vertex_map[self.weld.faces[np.concatenate(self.kept)]]
+        return replace(self, polygons=polygons_of(self.mesh, kept, found, self.kept))
 
     def with_new_normals(self, primitives: Sequence[TrianglePrimitive]) -> ControlMesh:
         """Return a copy over primitives with new normals: more rows at the same positions."""

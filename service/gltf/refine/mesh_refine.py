@@ -70,7 +70,7 @@ def creases_of(
     if options.crease == "normals":
         return Creases(hard_edges(control), border=options.border)
     if parts is None or options.crease != "auto" or not scheme.creases.learned:
-        by_shape = creases_by_shape(control.mesh, options, scheme)
+        by_shape = creases_by_shape(control.surface, options, scheme)
     else:
         by_shape = _creases_of_parts(control, parts, scheme)
     by_shape = replace(by_shape, border=options.border)
@@ -116,7 +116,7 @@ def refined_mesh(
     """
     try:
         made = refine(
-            control.mesh,
+            control.surface,
             scheme,
             options.levels,
             options.reference_length,
@@ -128,11 +128,11 @@ def refined_mesh(
             _check_range(made.mesh)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
-    faces, levels = made.mesh.faces, made.topologies
+    faces, levels, base = made.mesh.faces, made.topologies, made.scheme.base
     return RefinedMesh(
         made.mesh,
         [made.report],
-        *refined_skin_and_morph(control, faces, levels, options, course),
+        *refined_skin_and_morph(control, faces, levels, options, course, base=base),
         _scalars(made, options),
         made.normals if options.normals == "limit" else None,
         made.parents if traced else None,
@@ -230,7 +230,7 @@ def _check_range(mesh: Mesh) -> None:
 def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, " V"]]:
     """Return ratio and gate of the last learned level for `diagnostics=full`; otherwise nothing.
 
-    A vertex that a later level puts on an edge has the mean of its ends.
+    A vertex that a later level puts on an edge or into a quad has the mean of its corners.
     """
     if options.diagnostics != "full":
         return {}
@@ -240,7 +240,10 @@ def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, 
     depth, added = learned[-1]
     values = np.stack([added.ratio, added.gate], axis=1)
     for topology in made.topologies[depth + 1 :]:
-        values = np.concatenate([values, values[topology.edges].mean(axis=1)])
+        finer = [values, values[topology.edges].mean(axis=1)]
+        if made.scheme.base.polygons:
+            finer.append(values[topology.corners.reshape(-1, 4)].mean(axis=1))
+        values = np.concatenate(finer)
     return {RATIO: values[:, 0], GATE: values[:, 1]}
 
 

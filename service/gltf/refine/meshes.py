@@ -26,6 +26,7 @@ from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
 from .attributes import RefinedPrimitive, opposed_normals, refined_primitives
 from .control_mesh import ControlMesh, control_mesh
+from .level_one import refined_polygons
 from .mesh_refine import (
     changes_of_primitive,
     changes_of_vertices,
@@ -35,6 +36,7 @@ from .mesh_refine import (
 )
 from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
+from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces
 from .together import StageShares, kind_of, refine_together
 
@@ -118,6 +120,16 @@ def refined_meshes(
         done += count
 
 
+def mostly_polygons(upload: Upload) -> bool:
+    """Return whether half of a file's triangles or more are parts of larger polygons."""
+    joined = total = 0
+    for plan in upload.plans:
+        for primitive in _read(upload, plan):
+            total += len(primitive.corners)
+            joined += find_polygons(primitive, "auto").joined
+    return 2 * joined >= total
+
+
 def stage_shares(scheme: Scheme, options: Options) -> StageShares:
     """Return where the stages of a mesh begin, by their measured costs."""
     made = [4**level for level in range(1, options.levels + 1)]
@@ -159,7 +171,8 @@ def _window(
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
     # Rows of a union are numbered anew, and its faces are refined alike.
-    if len(window) > 1 and options.weld == "position" and chosen is None:
+    alike = chosen is None and not scheme.base.polygons
+    if len(window) > 1 and options.weld == "position" and alike:
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
     for done, place in enumerate(alone):
@@ -167,8 +180,11 @@ def _window(
             plan, own = window[place], None
             if chosen is not None:
                 own = [np.full(len(p.corners), chosen[plan.mesh, p.number]) for p in read[place]]
+            found = None
+            if scheme.base.polygons:
+                found = [find_polygons(p, options.polygons) for p in read[place]]
             outcomes[place] = refine_alone(
-                plan, read[place], scheme, options, course, shares, chosen=own
+                plan, read[place], scheme, options, course, shares, chosen=own, found=found
             )
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
@@ -229,14 +245,18 @@ def refine_alone(
     *,
     traced: bool = False,
     chosen: Chosen | None = None,
+    found: Sequence[Found] | None = None,
 ) -> MeshOutcome:
     """Refine one mesh, given by its primitives.
 
-    `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone.
+    `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone;
+    `found` are polygons of its triangles, for a scheme of polygons.
     """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options)
+        if found is not None:
+            control = control.joined(found)
         creases = creases_of(control, options, scheme)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
@@ -250,7 +270,12 @@ def refine_alone(
         if made is not None:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
             cut = None if chosen is None else cut_faces(control, chosen)
-            refined = refined_primitives(control, made, grid, blend, course, cut)
+            if control.polygons is not None:
+                refined = refined_polygons(
+                    control, control.polygons, made, creases, options, course
+                )
+            else:
+                refined = refined_primitives(control, made, grid, blend, course, cut)
             if cut is not None and made.parents is not None:
                 made = replace(made, parents=made.parents.unmoved(cut.still))
     changes = [
@@ -261,7 +286,7 @@ def refine_alone(
     (near,), (cut,) = control.near.tolist(), [0] if made is None else made.cut.tolist()
     changes += changes_of_vertices(near, cut, pointer)
     if made is not None:
-        (misses,) = near_misses(control.mesh, [made.reports[0]["reference_length"]])
+        (misses,) = near_misses(control.surface, [made.reports[0]["reference_length"]])
         changes += near_miss_changes(misses, pointer)
         changes += opposed_normals(refined, pointer)
     return MeshOutcome(
@@ -272,7 +297,7 @@ def refine_alone(
         copies=control.copies,
         report=None if made is None else made.reports[0],
         changes=changes,
-        bends=NO_BENDS if made is None else count_bends(control.mesh, creases)[0],
+        bends=NO_BENDS if made is None else count_bends(control.surface, creases)[0],
         parents=None if made is None or made.parents is None else _in_file(made.parents, control),
     )
 

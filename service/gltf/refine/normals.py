@@ -63,6 +63,10 @@ def corner_normals(
     return angle_weighted_normals(points, faces, groups, count, blocks, triangles)
 
 
+# The normals of the file, at rest (None) or under a morph target.
+Given = Callable[[int | None], Float[np.ndarray, "C 3"]]
+
+
 @dataclass(frozen=True, eq=False)
 class NormalGroups:
     """The G groups of refined corners that share a normal.
@@ -78,7 +82,7 @@ class NormalGroups:
     vertices: Int[np.ndarray, "F T"]
     connectivity: SplitConnectivity
     ids: dict[int, Int[np.ndarray, "F T"]]
-    given: Callable[[int | None], Float[np.ndarray, "C 3"]]
+    given: Given
     own: Float[np.ndarray, " C"] | None
 
     def before(self) -> Float[np.ndarray, "G 3"]:
@@ -148,7 +152,7 @@ def normal_groups(
     ]
     if not chosen:
         return None
-    corners, given = _corners(control, chosen)
+    corners, given, flat = _corners(control, chosen)
     groups = split_connectivity(corners, int(corners.max()) + 1, grid)
     shares = slices([len(ids[number]) for number in chosen])
     return NormalGroups(
@@ -156,14 +160,54 @@ def normal_groups(
         connectivity=groups,
         ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
         given=given,
-        own=_own(control, chosen, corners, given(None)) if control.authored else None,
+        own=_shares(control, chosen, corners, given, flat),
     )
+
+
+def _shares(
+    control: ControlMesh,
+    chosen: Sequence[int],
+    corners: Int[np.ndarray, "F 3"],
+    given: Given,
+    flat: Int[np.ndarray, " H"],
+) -> Float[np.ndarray, " C"] | None:
+    """Return the share of each group's normal that is its author's own; None if nothing is."""
+    if control.own is None:
+        return _own(control, chosen, corners, given(None)) if control.authored else None
+    shares = np.empty(int(corners.max()) + 1)
+    shares[corners.reshape(-1)] = control.own[_rows_of(control, chosen)[flat]]
+    return shares
+
+
+def own_of_rows(control: ControlMesh) -> Float[np.ndarray, " N"] | None:
+    """Return the share of each row's normal that is its author's own; None if nothing is."""
+    chosen = [
+        number
+        for number, primitive in enumerate(control.primitives)
+        if "NORMAL" in primitive.attributes and control.kept[number].any()
+    ]
+    if not chosen:
+        return None
+    corners, given, flat = _corners(control, chosen)
+    shares = _shares(control, chosen, corners, given, flat)
+    if shares is None:
+        return None
+    made = np.zeros(control.rows[-1].stop)
+    made[_rows_of(control, chosen)[flat]] = shares[corners.reshape(-1)]
+    return made
+
+
+def _rows_of(control: ControlMesh, chosen: Sequence[int]) -> Int[np.ndarray, " N"]:
+    return np.concatenate([np.arange(control.rows[n].start, control.rows[n].stop) for n in chosen])
 
 
 def _corners(
     control: ControlMesh, chosen: Sequence[int]
-) -> tuple[Int[np.ndarray, "F 3"], Callable[[int | None], Float[np.ndarray, "C 3"]]]:
-    """Return the faces over pairs of welded vertex and normal, and `NormalGroups.given`."""
+) -> tuple[Int[np.ndarray, "F 3"], Given, Int[np.ndarray, " H"]]:
+    """Return the faces over pairs of welded vertex and normal, `NormalGroups.given`, and rows.
+
+    The rows of the corners are numbered over those of the chosen primitives.
+    """
     starts = slices([len(control.primitives[number].attributes["NORMAL"]) for number in chosen])
     rows = [
         control.primitives[number].corners[control.kept[number]] + part.start
@@ -178,7 +222,7 @@ def _corners(
         values[corners] = _normals_under(control, chosen, target)[flat]
         return values
 
-    return corners.reshape(-1, 3), given
+    return corners.reshape(-1, 3), given, flat
 
 
 def _normals_under(

@@ -60,7 +60,8 @@ class MeshoptWriter(Writer):
     def stored(self, content: Shaped[np.ndarray, "N B"]) -> dict[str, Any]:
         """Append compressed elements; return a view of them in a placeholder buffer."""
         attributes = content.dtype == np.uint8
-        mode = "ATTRIBUTES" if attributes else "TRIANGLES"
+        mode = "INDICES" if self.in_order else "TRIANGLES"
+        mode = "ATTRIBUTES" if attributes else mode
         rows = content if attributes else content.reshape(-1)
         data = meshopt.encode_gltf_buffer(np.ascontiguousarray(rows), mode)
         view = {

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
 from ...report import Change
-from ..constants import FAN, FLOAT, STRIP, SURFACES
+from ..constants import FAN, FLOAT, NGONS, STRIP, SURFACES
 from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import withdraw
 from ..read.plan import MeshPlan, Spare
@@ -41,9 +41,26 @@ def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
 
 
 def withdraw_unused(tree: dict[str, Any]) -> None:
-    """Withdraw KHR_mesh_quantization if no primitive of the new file needs it."""
+    """Withdraw extensions that no primitive of the new file needs any more."""
     if not still_needed(tree):
         withdraw(tree, QUANTIZATION)
+    primitives = (p for mesh in tree.get("meshes", []) for p in mesh.get("primitives", []))
+    if not any(NGONS in p.get("extensions", {}) for p in primitives):
+        withdraw(tree, NGONS)
+
+
+def leave_out_ngons(tree: dict[str, Any], mesh: int, numbers: Iterable[int]) -> list[Change]:
+    """Leave FB_ngon_encoding out of primitives of a mesh whose triangles it no longer joins."""
+    changes: list[Change] = []
+    for number in numbers:
+        primitive = tree["meshes"][mesh]["primitives"][number]
+        if NGONS in primitive.get("extensions", {}):
+            del primitive["extensions"][NGONS]
+            if not primitive["extensions"]:
+                del primitive["extensions"]
+            what = f"{NGONS} left out: other triangles are in place of its own"
+            changes.append(Change(f"/meshes/{mesh}/primitives/{number}", what, 1))
+    return changes
 
 
 def _of_mesh(mesh: Mesh, plan: MeshPlan, document: Document) -> Iterator[Change]:

@@ -43,12 +43,16 @@ _COMPONENT_TYPE_OF = {dtype: number for number, dtype in COMPONENT_TYPES.items()
 
 @dataclass
 class Writer:
-    """A document being edited: the JSON tree, and the pieces of its only buffer."""
+    """A document being edited: the JSON tree, and the pieces of its only buffer.
+
+    `in_order`: whether triangles must keep the order of their corners, which compression may turn.
+    """
 
     tree: dict[str, Any]
     pieces: list[bytes | memoryview] = field(default_factory=list)
     length: int = 0
     starts: list[int] = field(default_factory=list)
+    in_order: bool = False
 
     @classmethod
     def start(cls, tree: dict[str, Any], buffers: Sequence[memoryview]) -> Self:

@@ -1,5 +1,7 @@
 /** The service's report, as far as the page reads it. */
 
+import type { Classic } from "../settings";
+
 export interface Summary {
   max: number;
   mean: number;
@@ -20,6 +22,7 @@ export interface Level {
 
 export interface Report {
   scheme: string;
+  base: Classic;
   budget: number | null;
   model: string | null;
   model_hash: string | null;
