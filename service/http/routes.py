@@ -17,13 +17,12 @@ from ..workers.job import Job
 from . import documentation
 from .admission import DrainingError
 from .answer import FileAnswer
-from .answer_types import answer_type
+from .answer_headers import answer_type, server_timing
 from .clients import client_of
 from .intake import Wanted, taken_in
 from .leaving import unless_gone
 from .limits import LimitsEntry, limits_of
 from .parameters import Parameters
-from .server_timing import server_timing
 from .service import Service
 
 log = logging.getLogger("pns.service")

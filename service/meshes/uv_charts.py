@@ -17,7 +17,7 @@ from pns_common.schemes import LOOP, BaseScheme
 from pns_common.topology import EdgeClass, Topology
 
 from ..options import Options
-from .quad_grid import at_quad_points
+from .barycentric_grid import at_quad_points
 from .split_connectivity import SplitConnectivity
 
 # How C corners at vertices (C,) of the mesh to refine spread their texture coordinates (C, 2) over

@@ -15,7 +15,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
-from .interrupts import no_interrupt
+from .ending import no_interrupt
 from .memory_file import MemoryFile
 
 T = TypeVar("T")

@@ -17,7 +17,7 @@ from typing import TypeVar
 from .. import log_lines
 from ..errors import ServiceError
 from ..request_ids import REQUEST_ID
-from .parent import end_with_parent
+from .ending import end_with_parent
 
 T = TypeVar("T")
 

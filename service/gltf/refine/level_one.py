@@ -15,8 +15,7 @@ from pns_common.schemes import CATMULL_CLARK
 from pns_common.topology import build_topology, halves_of
 
 from ...course import Course
-from ...meshes.barycentric_grid import barycentric_grid
-from ...meshes.quad_grid import HALVES
+from ...meshes.barycentric_grid import HALVES, barycentric_grid
 from ...meshes.uv_charts import refined_charts, uv_blend
 from ...meshes.weld import Weld
 from ...options import Options

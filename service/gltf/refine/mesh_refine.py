@@ -68,7 +68,7 @@ def creases_of(
     if control.is_empty:
         return NO_CREASES
     if options.crease == "normals":
-        return Creases(hard_edges(control), border=options.border)
+        return Creases(_on_surface(control, hard_edges(control)), border=options.border)
     if parts is None or options.crease != "auto" or not scheme.creases.learned:
         by_shape = creases_by_shape(control.surface, options, scheme)
     else:
@@ -76,7 +76,16 @@ def creases_of(
     by_shape = replace(by_shape, border=options.border)
     if options.crease != "auto" or not scheme.creases.finds:
         return by_shape
-    return by_shape.with_named(marked_edges(control))
+    return by_shape.with_named(_on_surface(control, marked_edges(control)))
+
+
+def _on_surface(control: ControlMesh, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"]:
+    """Return the edges that are none inside of a polygon, as between copies of its triangles."""
+    if control.polygons is None:
+        return pairs
+    keys = [len(control.mesh.vertices), 1]
+    edges = control.surface.topology().edges.astype(np.int64)
+    return pairs[np.isin(np.sort(pairs, axis=1) @ keys, edges @ keys)]
 
 
 def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Creases:

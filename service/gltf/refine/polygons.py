@@ -25,7 +25,7 @@ from pns_common.rows import cross, distinct_rows, dot, norm, unit
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.topology import Topology, build_topology
 
-from ...meshes.quad_grid import at_quad_points
+from ...meshes.barycentric_grid import at_quad_points
 from ...meshes.weld import canonical_zero
 from ...options import PolygonRule
 from ..read.primitives import TrianglePrimitive, distinct_corners

@@ -15,10 +15,9 @@ from ...errors import ServiceError
 from ...workers.job import State
 from .. import documentation, problems
 from ..answer import FileAnswer
-from ..answer_types import answer_type
+from ..answer_headers import answer_type, server_timing
 from ..clients import client_of
 from ..parameters import Parameters
-from ..server_timing import server_timing
 from ..service import Service
 from .book import Entry, NotDoneError
 from .store import ANSWER, REPORT

@@ -15,8 +15,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ...errors import WorkerDied
-from ...workers.interrupts import no_interrupt
-from ...workers.parent import end_with_parent
+from ...workers.ending import end_with_parent, no_interrupt
 from . import chunks
 from .chunks import Done
 from .work import Engine, R, T, Work

@@ -72,7 +72,10 @@ def test_a_glb_says_which_triangles_are_a_quad(compress: str) -> None:
     for primitive in tree["meshes"][0]["primitives"]:
         assert primitive["extensions"]["FB_ngon_encoding"] == {}
         assert {"NORMAL", "TEXCOORD_0", "COLOR_0"} <= primitive["attributes"].keys()
+        view = tree["bufferViews"][tree["accessors"][primitive["indices"]]["bufferView"]]
         if compress != "none":
+            # A stream of triangles would turn their corners.
+            assert view["extensions"]["EXT_meshopt_compression"]["mode"] == "INDICES"
             continue
         triangles = files.values_of(tree, binary, primitive["indices"]).reshape(-1, 3)
         first = triangles[:, 0]
@@ -82,6 +85,16 @@ def test_a_glb_says_which_triangles_are_a_quad(compress: str) -> None:
         quads += len(triangles) // 2
     assert quads in (0, 96)
     assert tree["asset"]["extras"]["pns"]["totals"]["faces"] == 96
+
+
+def test_draco_orders_triangles_anew_which_is_told() -> None:
+    written = made(cube(), "obj", "glb", levels=1, compress="draco")
+    tree, _ = files.unpack(written.content)
+    assert "FB_ngon_encoding" not in tree["extensionsUsed"]
+    for primitive in tree["meshes"][0]["primitives"]:
+        assert "FB_ngon_encoding" not in primitive["extensions"]
+    told = [change["what"] for change in written.report["changes"]]
+    assert sum("FB_ngon_encoding" in what for what in told) == 2
 
 
 def test_seams_hard_edges_and_smoothing_groups_are_kept() -> None:
@@ -111,8 +124,9 @@ def test_each_scheme_takes_polygons_as_it_says() -> None:
     with pytest.raises(InvalidParameter, match="material"):
         made(cube(), "obj", "obj", scheme="catmull-clark", material="m0")
     glb = made(cube(), "obj", "glb").content
+    assert made(glb, "glb", "glb", scheme="catmull-clark").faces == 2 * 4 * 24
     with pytest.raises(InvalidParameter, match="catmull-clark"):
-        made(glb, "glb", "glb", scheme="catmull-clark")
+        made(glb, "glb", "glb", scheme="catmull-clark", material="m0")
 
 
 @pytest.mark.parametrize(

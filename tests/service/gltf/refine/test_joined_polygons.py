@@ -156,11 +156,12 @@ def test_skins_and_morphs_follow_the_masks_of_the_positions():
 
 def test_copies_of_faces_follow_the_faces_that_they_copy():
     """Double-sided modelling: each quad a second time, the other way round."""
-    quads = np.concatenate([CUBE, 8 + CUBE[:, ::-1]])
+    front = halves(CUBE)
+    indices = np.concatenate([front, 8 + front[:, ::-1]])
     away = POINTS - POINTS.mean(axis=0)
     away /= np.linalg.norm(away, axis=1)[:, None]
     shape = {"POSITION": np.tile(POINTS, (2, 1)), "NORMAL": np.concatenate([away, -away])}
-    made = subdivide(shape | {"indices": halves(quads)}, levels=2)
+    made = subdivide(shape | {"indices": indices}, levels=2)
     assert made.report["totals"]["copied_faces"] == 12
     faces, attributes = files.primitive_of(made.glb)
     points = attributes["POSITION"]
@@ -218,6 +219,14 @@ def test_a_mesh_of_quads_is_found_whatever_the_order_of_its_triangles():
     for own in (faces, shuffled):
         made = subdivide({"POSITION": points, "indices": own}, levels=1)
         assert made.report["totals"]["faces"] == 25 * 8
+
+
+@pytest.mark.parametrize("uv", ["linear", "smooth"])
+def test_a_primitive_without_area_stays_as_it_is_beside_polygons(uv):
+    flat = {"POSITION": np.zeros((3, 3)), "indices": np.arange(3), "TEXCOORD_0": np.eye(3)[:, :2]}
+    made = subdivide(flat, cube(TEXCOORD_0=POINTS[:, :2]), uv=uv)
+    assert made.report["totals"]["primitives"] == 1
+    assert len(files.primitive_of(made.glb, primitive=1)[0]) == 12 * 4**2
 
 
 def test_repeated_and_degenerate_triangles_do_no_harm():

@@ -1,4 +1,4 @@
-"""What an answer is sent as: the file, the file as plain bytes, or its report."""
+"""Headers of answers: what an answer is sent as, and how long each stage of a job took."""
 
 from __future__ import annotations
 
@@ -16,3 +16,8 @@ def answer_type(request: Request, file_type: str = media.GLB) -> str:
     accept = ",".join(request.headers.getlist("accept"))
     # In the order of preference among equals.
     return max((file_type, media.JSON, media.BYTES), key=lambda kind: media.quality(kind, accept))
+
+
+def server_timing(seconds: dict[str, float]) -> str:
+    """Return the value of `Server-Timing`: milliseconds by stage."""
+    return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())
