@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from pns_common.kernels import are_compiled
+from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
 from pns_common.refinement import refine
 from pns_common.schemes import catmull_clark, loop, pns
 
-ANNOUNCEMENT = "Compiling kernels, once: some fifteen seconds"
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
 CLOSED, SHEET = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], [[0, 1, 2], [2, 1, 3]]
 
