@@ -1,4 +1,4 @@
-"""Headers of answers: what an answer is sent as, and how long each stage of a job took."""
+"""Write headers of answers: the media type, and how long each stage of a job took."""
 
 from __future__ import annotations
 

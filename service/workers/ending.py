@@ -1,4 +1,4 @@
-"""How processes end: workers with the process that started them, and not by Ctrl-C."""
+"""End processes: workers with the process that started them, and not by Ctrl-C."""
 
 from __future__ import annotations
 
