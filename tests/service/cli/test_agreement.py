@@ -44,6 +44,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
     "weld": {"weld": "off"},
     "weld_tolerance": {"weld_tolerance": 0.001},
     "border": {"border": "fixed"},
+    "polygons": {"polygons": "off"},
     "material": {"material": "a"},
     "group": {"group": "b"},
     "compress": {"compress": "draco"},

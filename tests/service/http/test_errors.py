@@ -351,6 +351,7 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "normals",
         "crease",
         "border",
+        "polygons",
         "material",
         "group",
         "weld",
