@@ -1,7 +1,7 @@
 """Coarse meshes as one disjoint union, with all about their limits that weights do not change."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
@@ -10,14 +10,14 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from pns_common import Mesh
-from train.connectivity import connect
-from train.data.batch import joined_meshes
-from train.data.pairs.references import Pair
+from pns_common.base_scheme import BaseScheme, in_threes
+from pns_common.mesh import fans
+from pns_common.parallel import Blocks
+from pns_common.topology import Topology
+from train.data.pairs.references import Pair, with_points
 from train.data.sharp_labels import coarse_sharp_edges
-from train.fitting.learned_level import LearnedLevel, learned_level
+from train.fitting.learned_level import LearnedLevel, learned_level, sparse_matrix
 from train.fitting.sharp_masks import applied
-from train.loop_masks import limit_mask
 from train.models.recipe import Recipe
 
 # Meshes stand so far apart that the nearest point of all surfaces is one of a mesh's own.
@@ -35,7 +35,8 @@ class LimitBatch:
         count: N.
         level: the control meshes.
         limit: from the points after two levels to their limit.
-        faces: some of the faces of these, drawn evenly, and the mesh that each belongs to.
+        faces: some of the triangles of these, drawn evenly.
+        owner: the mesh that each belongs to.
         area: each face's share of its mesh's area, summing to 1 a mesh.
         sharp: which interior edges are sharp in truth.
         tree: of all surfaces' points.
@@ -69,18 +70,21 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
     """Join pairs, each scaled to reference length 1, for a scale-free recipe."""
     shifts = [np.array([APART * index, 0.0, 0.0]) for index in range(len(pairs))]
     apart = [
-        Mesh(pair.coarse.vertices + at, pair.coarse.faces)
+        with_points(pair.coarse, pair.coarse.vertices + at)
         for pair, at in zip(pairs, shifts, strict=True)
     ]
-    joined = joined_meshes(apart)
     level = learned_level(apart, recipe)
-    mesh = connect(joined.faces, len(joined.vertices))
+    mesh, base = level.level.topology, level.level.base
+    corners = len(mesh.corners)
     for _ in range(2):
-        mesh = connect(mesh.split().numpy(), mesh.vertex_count + len(mesh.edges))
-    limit = sparse.csr_array(limit_mask(mesh).matrix())
-    owner = np.repeat(np.arange(len(pairs)), [16 * len(pair.coarse.faces) for pair in pairs])
+        mesh = base.split(mesh, Blocks(), inherit=False)
+    limit = limit_matrix(mesh, base)
+    faces = mesh.corners[fans(mesh.offsets)[0]].astype(np.int64)
+    # Every corner of a control mesh gives as many.
+    counts = [len(faces) * len(pair.coarse.corners) // corners for pair in pairs]
+    owner = np.repeat(np.arange(len(pairs)), counts)
     seen = np.sort(rng.choice(len(owner), min(SEEN, len(owner)), replace=False))
-    faces, owner = mesh.faces.numpy()[seen], owner[seen]
+    faces, owner = faces[seen], owner[seen]
     smooth = level.smooth_sharpness()
     ends = applied(limit, level.second(smooth, level.first(smooth, None))).numpy()
     a, b, c = (ends[faces[:, corner]] for corner in range(3))
@@ -104,6 +108,22 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         back=back,
         back_owner=from_mesh[back],
     )
+
+
+def limit_matrix(topology: Topology, base: BaseScheme) -> sparse.csr_array:
+    """Return the masks that put a mesh's vertices on the limit surface."""
+    limit = base.limit
+    assert limit is not None
+
+    def place(
+        values: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
+    ) -> Float[np.ndarray, "V K"]:
+        def masks(three: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "V 3"]:
+            return limit.positions(three, topology, blocks)
+
+        return in_threes(values, len(values), masks)
+
+    return sparse_matrix(topology, replace(base, place=place))
 
 
 def _joined(arrays: Iterable[np.ndarray]) -> np.ndarray:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.polygons import polygon_stream
 from train.data.pairs.references import Pair
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
@@ -113,9 +114,10 @@ def _fresh(
     recipe: Recipe, plan: ToLimit, rng: np.random.Generator
 ) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     waiting: list[Pair] = []
-    for pair in pair_stream(recipe.seed):
+    pairs = pair_stream if recipe.face is None else polygon_stream
+    for pair in pairs(recipe.seed):
         waiting.append(pair)
-        if sum(len(mesh_pair.coarse.faces) for mesh_pair in waiting) >= plan.faces:
+        if sum(mesh_pair.coarse.face_count for mesh_pair in waiting) >= plan.faces:
             batch = limit_batch(waiting, recipe, rng)
             waiting = []
             yield batch, reference_of(batch)

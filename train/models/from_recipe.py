@@ -1,13 +1,20 @@
 """What a recipe makes of edges and vertices: its untrained networks, and their rules."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 import torch
 
 from pns_common import ParameterError
-from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, FeatureSet
+from pns_common.features import (
+    FACE_FEATURE_SETS,
+    FEATURE_SETS,
+    RING_FEATURE_SETS,
+    FeatureSet,
+    Symmetries,
+)
 from train.models.networks import (
     INPUT_COUNT,
     BoundedNet,
@@ -38,11 +45,16 @@ FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
         "neighbours' umbrella height": 0.07,
         "opening": 0.14,
         "neighbours' mean jump": 0.05,
+        "mean bend": 0.1,
+        "middle of the bends": 0.1,
+        "half the range of the bends": 0.1,
+        "corners' umbrella height": 0.08,
+        "half the range of these heights": 0.05,
     }
 )
 
 # Each network has a draw of its own.
-VERTEX_SEED, SHARP_SEED = 1 << 20, 1 << 21
+VERTEX_SEED, SHARP_SEED, FACE_SEED = 1 << 20, 1 << 21, 1 << 22
 
 
 def initial_network(recipe: Recipe) -> BoundedNet:
@@ -51,7 +63,7 @@ def initial_network(recipe: Recipe) -> BoundedNet:
     if recipe.orientation != "symmetric":
         return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
     seen = FEATURE_SETS[recipe.features]
-    return _keeping_symmetry(recipe, seen, recipe.hidden, generator)
+    return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.hidden, generator)
 
 
 def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
@@ -60,7 +72,7 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
         return None
     generator = torch.Generator().manual_seed(VERTEX_SEED + recipe.seed)
     seen = RING_FEATURE_SETS[recipe.vertex.features]
-    return _keeping_symmetry(recipe, seen, recipe.vertex.hidden, generator)
+    return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.vertex.hidden, generator)
 
 
 def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
@@ -72,6 +84,17 @@ def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
     return SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
 
 
+def initial_face_network(recipe: Recipe) -> BoundedNet | None:
+    """Return the untrained face network of a recipe; None where its scheme has none."""
+    if recipe.face is None:
+        return None
+    generator = torch.Generator().manual_seed(FACE_SEED + recipe.seed)
+    seen = FACE_FEATURE_SETS[recipe.face.features]
+    # It answers along the normal alone.
+    along = replace(seen.symmetries, local=seen.symmetries.local[:, :1])
+    return _keeping_symmetry(recipe, seen, along, recipe.face.hidden, generator)
+
+
 def initial_networks(recipe: Recipe) -> Networks:
     """Return the untrained networks of a scale-free recipe.
 
@@ -81,12 +104,13 @@ def initial_networks(recipe: Recipe) -> Networks:
     vertex, sharp = initial_vertex_network(recipe), initial_sharpness_network(recipe)
     if vertex is None or sharp is None:
         raise ParameterError("recipe", recipe.name, expected="three networks")
-    return Networks(initial_network(recipe), vertex, sharp)
+    return Networks(initial_network(recipe), vertex, sharp, initial_face_network(recipe))
 
 
 def _keeping_symmetry(
     recipe: Recipe,
     seen: FeatureSet,
+    group: Symmetries,
     hidden: tuple[int, ...],
     generator: torch.Generator,
 ) -> BoundedNet:
@@ -95,7 +119,6 @@ def _keeping_symmetry(
     Raises:
         ParameterError: a layer of a tied network is no whole number of copies of the group.
     """
-    group = seen.symmetries
     if recipe.scale_free is None:
         return SymmetricNet(group, hidden, recipe.activation, generator)
     if any(width < 1 or width % len(group.order) for width in hidden):

@@ -47,8 +47,8 @@ class VertexRule:
 
 
 @dataclass(frozen=True, slots=True)
-class SharpnessRule:
-    """The sharpness network: its features and hidden widths."""
+class NetworkShape:
+    """The sharpness or the face network: its features and hidden widths."""
 
     features: str
     hidden: tuple[int, ...]
@@ -135,6 +135,7 @@ class Recipe:
         vertex: the learned rule for old vertices; None leaves them to Loop.
         scale_free: the rule of format 4; None is the paper's.
         sharpness: its sharpness network.
+        face: its network of face vertices, over Catmull–Clark.
     """
 
     name: str
@@ -150,7 +151,8 @@ class Recipe:
     orientation: str = "first-face"
     vertex: VertexRule | None = None
     scale_free: ScaleFree | None = None
-    sharpness: SharpnessRule | None = None
+    sharpness: NetworkShape | None = None
+    face: NetworkShape | None = None
 
 
 def one_step(recipe: Recipe) -> OneStep:

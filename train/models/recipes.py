@@ -9,10 +9,10 @@ import msgspec
 from train.models.recipe import (
     LimitWeights,
     LossWeights,
+    NetworkShape,
     OneStep,
     Recipe,
     ScaleFree,
-    SharpnessRule,
     ToLimit,
     VertexRule,
     one_step,
@@ -123,10 +123,28 @@ def general(seed: int = 0) -> Recipe:
             fold_angle=40.0,
             sharpness_levels=2,
         ),
-        sharpness=SharpnessRule("crease-53", hidden=(32, 32)),
+        sharpness=NetworkShape("crease-53", hidden=(32, 32)),
+    )
+
+
+def general_quad(seed: int = 0) -> Recipe:
+    """Return the recipe for meshes of polygons: `general` over Catmull–Clark."""
+    base = general(seed)
+    assert base.scale_free is not None
+    return replace(
+        base,
+        name="general-quad",
+        scale_free=replace(base.scale_free, base="catmull-clark", prior_strength=1.0),
+        face=NetworkShape("face-8", hidden=(32, 32)),
     )
 
 
 RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
-    {"paper": paper, "paper-text": paper_text, "signed": signed, "general": general}
+    {
+        "paper": paper,
+        "paper-text": paper_text,
+        "signed": signed,
+        "general": general,
+        "general-quad": general_quad,
+    }
 )

@@ -17,8 +17,11 @@ from train.data.pairs.machined import machined_pairs
 from train.data.pairs.references import Pair, moved, patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
 
+Single = Callable[[np.random.Generator], Pair | None]
+Several = Callable[[np.random.Generator], Iterator[Pair]]
+
 # How often each draws a pair, in the order that a seed means.
-SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
+SHARES: Mapping[Single, float] = MappingProxyType(
     {
         patch_pair: 0.05,
         grid_pair: 0.10,
@@ -28,19 +31,25 @@ SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingPr
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
-SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.22, solid_pairs: 0.40}
-)
+SHARED: Mapping[Several, float] = MappingProxyType({machined_pairs: 0.22, solid_pairs: 0.40})
 
 MOST_FACES = 1200
 
 
 def pair_stream(seed: int) -> Iterator[Pair]:
     """Yield all pairs of a seed, without end: centred, with reference length R = 1."""
-    rng = np.random.default_rng(seed)
-    singles, several = list(SHARES), list(SHARED)
+    for pair in drawn_pairs(np.random.default_rng(seed), SHARES, SHARED):
+        if pair.coarse.face_count <= MOST_FACES:
+            yield pair
+
+
+def drawn_pairs(
+    rng: np.random.Generator, of_one: Mapping[Single, float], of_several: Mapping[Several, float]
+) -> Iterator[Pair]:
+    """Yield pairs of makers, as often as their shares say: centred, with reference length R = 1."""
+    singles, several = list(of_one), list(of_several)
     waiting: list[list[Pair]] = [[] for _ in several]
-    ends = np.cumsum([*SHARES.values(), *SHARED.values()])
+    ends = np.cumsum([*of_one.values(), *of_several.values()])
     while True:
         kind = int(np.searchsorted(ends, rng.random()))
         if kind < len(singles):
@@ -49,9 +58,7 @@ def pair_stream(seed: int) -> Iterator[Pair]:
             number = kind - len(singles)
             waiting[number] = waiting[number] or list(several[number](rng))
             pair = waiting[number].pop() if waiting[number] else None
-        if pair is not None and len(pair.coarse.faces) <= MOST_FACES:
-            scale = 1 / measure_reference_length(
-                pair.coarse.vertices, pair.coarse.faces.reshape(-1)
-            )
+        if pair is not None:
+            scale = 1 / measure_reference_length(pair.coarse.vertices, pair.coarse.corners)
             centre = pair.coarse.vertices.mean(axis=0)
             yield moved(pair, scale * np.eye(3), -scale * centre)
