@@ -9,6 +9,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pns_common import Mesh
+from pns_common.normals import measure_faces
+from pns_common.parallel import Blocks
 from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
 from train.data.pairs import references as subject
@@ -17,6 +19,7 @@ from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair, turned
 from train.data.pairs.machined import machined_pairs
 from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.polygons import in_polygons, is_manifold, polygon_stream, remeshed
 from train.data.pairs.references import (
     WAYS,
     Pair,
@@ -110,6 +113,53 @@ def test_the_stream_has_reference_length_one():
     for pair in begun(1):
         corners = pair.coarse.faces.reshape(-1)
         assert measure_reference_length(pair.coarse.vertices, corners) == pytest.approx(1)
+
+
+@cache
+def polygons(seed):
+    """The first pairs of a stream of polygons."""
+    return list(islice(polygon_stream(seed), 8))
+
+
+def test_polygons_are_mostly_quads_and_lie_on_their_surface_the_way_it_looks():
+    degrees = np.concatenate([np.diff(pair.coarse.offsets) for pair in polygons(0)])
+    assert (degrees == 4).mean() > 0.6
+    for pair in polygons(0):
+        mesh = pair.coarse
+        assert measure_reference_length(mesh.vertices, mesh.corners) == pytest.approx(1)
+        normals, _ = measure_faces(mesh.vertices, mesh.topology(), Blocks(), areas=False)
+        middle = np.array([mesh.vertices[face].mean(axis=0) for face in mesh.polygons])
+        _, nearest = cKDTree(pair.surface.points).query(middle)
+        assert np.median((normals * pair.surface.normals[nearest]).sum(axis=1)) > 0.9
+
+
+def test_a_stream_of_polygons_depends_on_its_seed_alone():
+    for a, b in zip(polygons(0), islice(polygon_stream(0), 8), strict=True):
+        np.testing.assert_array_equal(a.coarse.vertices, b.coarse.vertices)
+        np.testing.assert_array_equal(a.coarse.corners, b.coarse.corners)
+
+
+def test_triangles_of_a_drum_are_joined_to_its_quads_and_lids():
+    drum = turned(np.array([[1.0, 0], [1, 2]]), 12, np.array([False, False]))
+    seen = set()
+    for seed in range(8):
+        made = in_polygons(drum, np.random.default_rng(seed))
+        degrees = np.bincount(np.diff(made.offsets), minlength=13)
+        assert volume(made.triangulated()) == pytest.approx(volume(drum))
+        assert is_manifold(made)
+        walls = [face for face in made.polygons if np.ptp(made.vertices[face, 2]) > 1]
+        assert [len(face) for face in walls] == [4] * 12
+        seen.add(int(degrees[12]))
+    assert seen == {0, 2}
+
+
+def test_a_sphere_in_quads_lies_on_it_with_about_the_faces_asked_for():
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        mesh = remeshed(SPHERE.vertices, SPHERE.faces, 400, rng)
+        assert mesh is not None
+        assert 100 < mesh.face_count < 400
+        assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.05
 
 
 def test_moved_pairs_keep_normals_at_right_angles():

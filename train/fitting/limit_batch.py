@@ -14,7 +14,8 @@ from pns_common.base_scheme import BaseScheme, in_threes
 from pns_common.mesh import fans
 from pns_common.parallel import Blocks
 from pns_common.topology import Topology
-from train.data.pairs.references import Pair, with_points
+from train.data.pairs.references import Pair
+from train.data.remeshers import with_points
 from train.data.sharp_labels import coarse_sharp_edges
 from train.fitting.learned_level import LearnedLevel, learned_level, sparse_matrix
 from train.fitting.sharp_masks import applied

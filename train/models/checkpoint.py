@@ -84,8 +84,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
             state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts = msgspec.json.decode(metadata[METADATA_KEY], type=_Facts)
         network = initial_network(facts.recipe)
-        of_recipe = initial_vertex_network, initial_sharpness_network, initial_face_network
-        vertex, sharpness, face = (initial(facts.recipe) for initial in of_recipe)
+        vertex = initial_vertex_network(facts.recipe)
+        sharpness = initial_sharpness_network(facts.recipe)
+        face = initial_face_network(facts.recipe)
         for prefix, part in zip(PREFIXES, (vertex, sharpness, face), strict=True):
             if part is not None:
                 names = [name for name in state if name.startswith(prefix)]

@@ -30,9 +30,9 @@ ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
 class BoundedNet(nn.Module):
     """A small perceptron whose output never leaves the ball: η = C z / max(1, ‖z‖).
 
-    Answers are vectors, or with `outputs` 1 lengths. The bound holds for any weights.
-    Its layers are `net.0`, `net.2`, …, as in the published state
-    dictionaries. Source: paper, PNS operator and algorithm.
+    Answers are vectors, or with `outputs` 1 lengths. The bound holds for any weights. Its layers
+    are `net.0`, `net.2`, …, as in the published state dictionaries. Source: paper, PNS operator and
+    algorithm.
     """
 
     def __init__(

@@ -5,18 +5,15 @@ vertices laid onto the shape; cages are split; triangles of all other pairs are 
 flat parts of them in n-gons, as modellers draw.
 """
 
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
-import pynanoinstantmeshes
 from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pns_common import Mesh, catmull_clark, refine
+from pns_common import Mesh, MeshError, catmull_clark, refine
 from pns_common.topology import EdgeClass
 from train.connectivity import connect, next_corner
 from train.data.pairs.faceted import block, faceted_pair
@@ -31,14 +28,14 @@ from train.data.pairs.references import (
     coarsened,
     patch_pair,
     sphere_pair,
-    with_points,
 )
 from train.data.pairs.solid import solid_pairs
-from train.metrics.surface_distance import face_tree, nearest
+from train.data.remeshers import instant, laid_onto, with_points
 from train.vectors import dot, face_normals, unit
 
 # How often a dense shape is remeshed in quads; else it is simplified and triangles are joined.
 REMESHED = 0.65
+MOST_SMOOTHED = 3
 
 # How often vertices are laid onto the shape, where triangles were joined.
 LAID = 0.5
@@ -86,26 +83,18 @@ def remeshed(
     rng: np.random.Generator,
 ) -> Mesh | None:
     """Return a mesh of quads, as large as one of so many triangles; None where it is spoilt."""
-    tree = face_tree(Mesh(points, faces))
+    dense = Mesh(points, faces)
     if rng.random() < REMESHED:
-        asked = max(count // 8, 6)  # each vertex becomes four
-        smoothed = int(rng.integers(0, 4))
-        with _silence():
-            made, quads = pynanoinstantmeshes.remesh(
-                points.astype(np.float32),
-                faces.astype(np.uint32),
-                asked,
-                smooth_iter=smoothed,
-                deterministic=True,
-            )
-        mesh = _tidied(made.astype(np.float64), quads.astype(np.int64))
-        laid = True
-    else:
-        mesh, laid = coarsened(points, faces, count, rng), rng.random() < LAID
-        mesh = None if mesh is None else in_polygons(mesh, rng)
-    if mesh is None or not is_manifold(mesh):
+        try:
+            mesh = instant(dense, count // 2, int(rng.integers(MOST_SMOOTHED + 1)))
+        except MeshError:
+            return None
+        return mesh if is_manifold(mesh) else None
+    mesh = coarsened(points, faces, count, rng)
+    if mesh is None:
         return None
-    return with_points(mesh, nearest(tree, mesh.vertices).point) if laid else mesh
+    mesh = in_polygons(mesh, rng)
+    return laid_onto(dense, mesh) if rng.random() < LAID else mesh
 
 
 def is_manifold(mesh: Mesh) -> bool:
@@ -188,30 +177,3 @@ def _flat_parts(mesh: Mesh) -> tuple[list[np.ndarray], np.ndarray]:
             polygons.append(np.array(loop))
             free[own] = False
     return polygons, free
-
-
-def _tidied(points: Float[np.ndarray, "V 3"], quads: Int[np.ndarray, "F 4"]) -> Mesh | None:
-    """Return a mesh without repeated corners, faces and unused vertices; None if it has no face."""
-    faces = {}
-    for quad in quads.tolist():
-        face = [corner for place, corner in enumerate(quad) if corner != quad[place - 1]]
-        if len(set(face)) == len(face) > 2:
-            faces.setdefault(frozenset(face), face)
-    if not faces:
-        return None
-    corners = np.concatenate(list(faces.values()))
-    used, numbers = np.unique(corners, return_inverse=True)
-    return Mesh(points[used], (numbers, np.cumsum([0, *map(len, faces.values())])))
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Send what a library prints past Python nowhere."""
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)

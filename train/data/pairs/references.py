@@ -10,6 +10,7 @@ from pns_common import Mesh, MeshError, loop
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold
 from train.data.primitives import icosphere
+from train.data.remeshers import with_points
 from train.data.simplifiers import SIMPLIFIERS, fast_quadric
 from train.data.stream import random_instance
 from train.refining import refine
@@ -52,11 +53,6 @@ LEAST_SHARP = np.radians(15)
 
 # A surface without sharp edges.
 SMOOTH: Segments = np.zeros((0, 2, 3))
-
-
-def with_points(mesh: Mesh, points: Float[np.ndarray, "V 3"]) -> Mesh:
-    """Return a mesh with its vertices elsewhere."""
-    return Mesh(points, (mesh.corners, mesh.offsets))
 
 
 def turns(mesh: Mesh, beside: Int[np.ndarray, "E 2"]) -> Float[np.ndarray, " E"]:

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pns_common import MeshError
-from train.data.pairs.references import Coarsen, Pair, Reference, coarsened, with_points
+from train.data.pairs.references import Coarsen, Pair, Reference, coarsened
+from train.data.remeshers import with_points
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
 
