@@ -34,11 +34,11 @@ def fit_to_limit(
 ) -> tuple[Networks, tuple[float, ...]]:
     """Return the trained networks of a scale-free recipe, and the loss before each step.
 
-    Sharpness alone is trained first, against the truth; then all three networks on the limit.
+    Sharpness alone is trained first, against the truth; then all networks on the limit.
     """
     with deterministic():
         networks = initial_networks(recipe)
-        weights = list(networks.parameters())
+        weights = [each for each in networks.parameters() if each.requires_grad]
         optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP

@@ -5,9 +5,11 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+import onnx
 import torch
+from onnx import numpy_helper
 
-from pns_common import ParameterError
+from pns_common import ParameterError, load_model
 from pns_common.features import (
     FACE_FEATURE_SETS,
     FEATURE_SETS,
@@ -76,12 +78,23 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
 
 
 def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
-    """Return the untrained sharpness network of a recipe; None where it has none."""
+    """Return the untrained sharpness network of a recipe, or another model's; None without one."""
     seen = recipe.sharpness
     if seen is None:
         return None
     generator = torch.Generator().manual_seed(SHARP_SEED + recipe.seed)
-    return SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+    made = SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+    return made if seen.of_model is None else taken_over(made, seen.of_model)
+
+
+def taken_over(network: SharpNet, model: str) -> SharpNet:
+    """Return a sharpness network with the weights of a bundled model's, which stay as they are."""
+    graph = onnx.load_from_string(load_model(model).data).graph
+    arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    for number, layer in enumerate(network.linear_layers):
+        layer.weight.data.copy_(torch.from_numpy(arrays[f"sharpness_weight_{number}"].copy()))
+        layer.bias.data.copy_(torch.from_numpy(arrays[f"sharpness_bias_{number}"].copy()))
+    return network.requires_grad_(False)
 
 
 def initial_face_network(recipe: Recipe) -> BoundedNet | None:

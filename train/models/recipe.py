@@ -48,10 +48,17 @@ class VertexRule:
 
 @dataclass(frozen=True, slots=True)
 class NetworkShape:
-    """The sharpness or the face network: its features and hidden widths."""
+    """The sharpness or the face network.
+
+    Attributes:
+        features: name of its features.
+        hidden: hidden widths.
+        of_model: a bundled model whose sharpness network is taken over and not trained.
+    """
 
     features: str
     hidden: tuple[int, ...]
+    of_model: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
