@@ -84,7 +84,7 @@ def trained_and_product(mesh, recipe):
     return recipe, networks, sharp, first
 
 
-@pytest.mark.parametrize("body", polygon_bodies(0), ids=lambda body: body.name)
+@pytest.mark.parametrize("body", [*polygon_bodies(0)], ids=lambda body: body.name)
 def test_both_levels_that_are_trained_on_polygons_are_the_products(body):
     trained_and_product(body.mesh, general_quad())
 

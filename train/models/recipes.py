@@ -142,9 +142,14 @@ def general_quad(seed: int = 0) -> Recipe:
         name="general-quad",
         scale_free=replace(base.scale_free, base="catmull-clark", prior_strength=1.0),
         training=msgspec.structs.replace(
-            plan, weights=replace(plan.weights, sharp=0.0), faces=400, pool=120, reuse=24, start=0
+            plan,
+            weights=replace(plan.weights, normal=4.0, sharp=0.0),
+            faces=400,
+            pool=80,
+            reuse=16,
+            start=0,
         ),
-        steps=2400,
+        steps=1200,
         sharpness=replace(base.sharpness, of_model="general"),
         face=NetworkShape("face-8", hidden=(32, 32)),
     )
