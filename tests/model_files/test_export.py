@@ -270,3 +270,9 @@ def test_a_file_for_polygons_says_what_its_four_networks_say(tmp_path):
     asked = np.random.default_rng(0).standard_normal((50, 53))
     np.testing.assert_allclose(model.sharpness(asked), load_model().sharpness(asked), atol=1e-6)
     assert not any(weight.requires_grad for weight in networks.sharp.parameters())
+
+
+def test_the_bundled_models_find_the_same_edges_sharp():
+    asked = np.random.default_rng(0).standard_normal((50, 53))
+    answers = [load_model(name).sharpness(asked) for name in ("general", "general-quad")]
+    np.testing.assert_array_equal(*answers)

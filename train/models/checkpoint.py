@@ -71,7 +71,7 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
-    """Read a checkpoint.
+    """Read a checkpoint; a sharpness network that is another model's is taken from that one now.
 
     Raises:
         ModelError: there is no such file, or it is no checkpoint of ours.
@@ -90,7 +90,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
         for prefix, part in zip(PREFIXES, (vertex, sharpness, face), strict=True):
             if part is not None:
                 names = [name for name in state if name.startswith(prefix)]
-                part.load_state_dict({n.removeprefix(prefix): state.pop(n) for n in names})
+                own = {n.removeprefix(prefix): state.pop(n) for n in names}
+                if any(weight.requires_grad for weight in part.parameters()):
+                    part.load_state_dict(own)
         network.load_state_dict(state)
     except (SafetensorError, KeyError, msgspec.MsgspecError, RuntimeError) as error:
         raise ModelError(
