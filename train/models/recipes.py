@@ -143,7 +143,7 @@ def general_quad(seed: int = 0) -> Recipe:
         scale_free=replace(base.scale_free, base="catmull-clark", prior_strength=1.0),
         training=msgspec.structs.replace(
             plan,
-            weights=replace(plan.weights, normal=4.0, sharp=0.0),
+            weights=replace(plan.weights, sharp=0.0),
             faces=400,
             pool=80,
             reuse=16,
