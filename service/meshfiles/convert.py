@@ -55,7 +55,7 @@ STREAM = Path("-")
 
 @dataclass(frozen=True)
 class Jobs:
-    """What `pns subdivide` is asked for.
+    """Arguments of `pns subdivide`.
 
     Attributes:
         sources: files to read; `-` is stdin.
