@@ -45,7 +45,7 @@ class BoundedNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, outputs), activation, generator)
+        self.net = perceptron((feature_count, *hidden, outputs), activation, generator)
 
     def forward(
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
@@ -76,7 +76,7 @@ class SharpNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, 1), activation, generator)
+        self.net = perceptron((feature_count, *hidden, 1), activation, generator)
 
     def forward(self, features: Float[Tensor, "N K"]) -> Float[Tensor, "N 1"]:
         """Return the answer before the sigmoid."""
@@ -145,9 +145,10 @@ def _single(values: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
     return torch.from_numpy(values.astype(np.float32))
 
 
-def _perceptron(
+def perceptron(
     widths: tuple[int, ...], activation: str, generator: torch.Generator
 ) -> nn.Sequential:
+    """Return linear layers from each width to the next, and activations between them."""
     layers: list[nn.Module] = []
     for fan_in, fan_out in pairwise(widths):
         layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]
