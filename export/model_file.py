@@ -72,7 +72,6 @@ ORDER = (
     "faces",
     "pool",
     "reuse",
-    "trained_strength",
     "start",
     "learning_rate",
     "final_learning_rate",

@@ -72,9 +72,6 @@ def test_both_levels_that_are_trained_are_the_formulas_and_the_products(mesh):
         first = made.first(sharp, networks)
         second = made.second(sharp, first)
     assert 0.05 < sharp.edge[made.interior].max() < 1
-    # In use the prior is weaker.
-    strength = recipe.training.trained_strength
-    recipe = replace(recipe, scale_free=replace(recipe.scale_free, prior_strength=strength))
     scheme = pns(recipe_model(recipe, networks.edge, networks.vertex, networks.sharp))
     product = refine(mesh, scheme, 2, 1.0).mesh.vertices
     np.testing.assert_allclose(second, product, atol=1e-12)

@@ -168,7 +168,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
     Raises:
         ParameterError: the recipe is not scale-free.
     """
-    form, vertex_rule, strength = scale_free_parts(recipe)
+    form, vertex_rule = scale_free_parts(recipe)
     rule = operator.Rule(
         edge_network=_not_asked,
         feature_count=18,
@@ -217,7 +217,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         push=torch.from_numpy(operator.pushes(level, unit_prior)),
         numbers={
             "budget": recipe.budget,
-            "strength": strength,
+            "strength": form.prior_strength,
             "curve": form.boundary_strength,
             "vertex_gate": vertex_rule.gate_sharpness,
             "fold_angle": math.radians(form.fold_angle),

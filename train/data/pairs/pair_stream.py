@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, turned parts, and machined ones.
+solids of plane faces, parts drawn with few faces, and machined ones.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -20,16 +20,16 @@ from train.data.pairs.solid import solid_pairs
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.05,
-        grid_pair: 0.10,
-        sphere_pair: 0.05,
-        faceted_pair: 0.08,
-        lathe_pair: 0.10,
+        patch_pair: 0.09,
+        grid_pair: 0.06,
+        sphere_pair: 0.04,
+        faceted_pair: 0.06,
+        lathe_pair: 0.24,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.22, solid_pairs: 0.40}
+    {machined_pairs: 0.14, solid_pairs: 0.37}
 )
 
 MOST_FACES = 1200
