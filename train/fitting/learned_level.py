@@ -9,7 +9,7 @@ gradients pass through z and w, with the order of weights around vertices and s 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
@@ -120,12 +120,15 @@ class LearnedLevel:
         if networks is None:
             return base
         delta = self.displacement(sharp, networks)
+        # Where another edge is a little sharp, the boundary places no vertex alone.
+        shared = self.curves.shared.copy()
+        shared[: len(self.points)] &= sharp.third.detach().numpy() == 0
         scale = operator.guard_scale(
             self.level,
             base.detach().numpy(),
             delta.detach().numpy(),
             self.numbers["fold_angle"],
-            self.curves,
+            replace(self.curves, shared=shared),
         )
         return base + torch.from_numpy(scale)[:, None] * delta
 
