@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from train.experiments.beyond import (
-    cad,
     fairness,
-    families,
     fresh_ridges,
     models,
     shading,
@@ -46,9 +44,7 @@ ORDERED: tuple[Experiment, ...] = (
     sphere_ridge.EXPERIMENT,
     hero.EXPERIMENT,
     extended.EXPERIMENT,
-    cad.EXPERIMENT,
     models.EXPERIMENT,
-    families.EXPERIMENT,
     validation.EXPERIMENT,
     whole_meshes.EXPERIMENT,
     spheres.EXPERIMENT,
