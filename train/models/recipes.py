@@ -102,14 +102,14 @@ def general(seed: int = 0) -> Recipe:
         gate_sharpness=1e7,
         training=ToLimit(
             weights=LimitWeights(
-                mean=1.0, spread=0.5, peak=0.7, normal=4.0, worse=1.5, worse_from=0.95, sharp=0.5
+                mean=1.0, spread=0.5, peak=0.7, normal=4.0, worse=1.5, worse_from=0.95, sharp=1.5
             ),
             faces=600,
             pool=80,
-            reuse=25,
-            start=300,
+            reuse=30,
+            start=800,
         ),
-        steps=6500,
+        steps=6000,
         learning_rate=2.5e-3,
         seed=seed,
         orientation="symmetric",

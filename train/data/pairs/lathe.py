@@ -212,4 +212,4 @@ def _wavy(rng: np.random.Generator) -> tuple[Plan, Plan]:
 
 PLANS = (_round, _angular, _slice, _rounded, _wavy)
 # How often each is drawn.
-SHARES = (0.45, 0.15, 0.2, 0.12, 0.08)
+SHARES = (0.42, 0.13, 0.25, 0.12, 0.08)

@@ -66,7 +66,17 @@ def _pieces(rng: np.random.Generator) -> Outline:
     tips = rng.random(2) < TIP
     tips[0] &= count > 1 or not tips[1]
     radius[[0, -1]] = np.where(tips, 0.0, radius[[0, -1]])
-    return np.stack([radius, height], axis=1)
+    return _with_rows(np.stack([radius, height], axis=1), rng)
+
+
+def _with_rows(outline: Outline, rng: np.random.Generator) -> Outline:
+    """Cut each straight piece into up to three, now and then."""
+    most = int(rng.choice([1, 1, 2, 3]))
+    counts = rng.integers(1, most + 1, len(outline) - 1)
+    shares = [np.arange(count) / count for count in counts]
+    place = np.concatenate([k + share for k, share in enumerate(shares)] + [[len(outline) - 1]])
+    known = np.arange(len(outline))
+    return np.stack([np.interp(place, known, column) for column in outline.T], axis=1)
 
 
 def _barrel(rng: np.random.Generator) -> Outline:
@@ -93,7 +103,8 @@ def _cake(rng: np.random.Generator) -> Outline:
     radius = np.exp(rng.uniform(-0.7, 0.3, count))
     if rng.random() < 0.6:
         radius = np.sort(radius)[::-1]
-    return np.stack([np.repeat(radius, 2), np.repeat(height, 2)[1:-1]], axis=1)
+    outline = np.stack([np.repeat(radius, 2), np.repeat(height, 2)[1:-1]], axis=1)
+    return _with_rows(outline, rng)
 
 
 def _limb(rng: np.random.Generator) -> Outline:

@@ -21,15 +21,15 @@ from train.data.pairs.solid import solid_pairs
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
         patch_pair: 0.09,
-        grid_pair: 0.06,
+        grid_pair: 0.05,
         sphere_pair: 0.04,
         faceted_pair: 0.06,
-        lathe_pair: 0.24,
+        lathe_pair: 0.27,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.14, solid_pairs: 0.37}
+    {machined_pairs: 0.14, solid_pairs: 0.35}
 )
 
 MOST_FACES = 1200
