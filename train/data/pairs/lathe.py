@@ -72,10 +72,10 @@ def _part(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
     plan, fine_plan = PLANS[rng.choice(len(PLANS), p=SHARES)](rng)
     kind = OUTLINES[int(rng.integers(len(OUTLINES)))]
     outline, closed = kind(rng), kind is wheel
-    curve = smoothed(outline, closed=closed)
+    curve, lid = smoothed(outline, closed=closed), ears(fine_plan)
     way = random_cut(len(outline), len(plan), rng)
     coarse = raised(outline, plan, (random_lid(plan, rng), random_lid(plan, rng)), way, closed)
-    return coarse, raised(curve, fine_plan, (ears(fine_plan),) * 2, closed=closed)
+    return coarse, raised(curve, fine_plan, (lid, lid), closed=closed)
 
 
 def raised(
