@@ -38,7 +38,7 @@ class LimitBatch:
         faces: some of the faces of these, drawn evenly, and the mesh that each belongs to.
         area: each face's share of its mesh's area, summing to 1 a mesh.
         sharp: which interior edges are sharp in truth.
-        edge_owner, edge_count: the mesh of each interior edge, and how many each has.
+        edge_owner, edge_share: the mesh of each, and its share of all their turns there.
         tree: of all surfaces' points.
         points, normals: of all surfaces.
         back: the surfaces' points from which the limit is looked at.
@@ -53,7 +53,7 @@ class LimitBatch:
     area: Float[Tensor, " F"]
     sharp: Float[Tensor, " I"]
     edge_owner: Int[np.ndarray, " I"]
-    edge_count: Float[Tensor, " N"]
+    edge_share: Float[Tensor, " I"]
     tree: KDTree
     points: Float[np.ndarray, "S 3"]
     normals: Float[np.ndarray, "S 3"]
@@ -96,7 +96,8 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
     edge_owner = np.repeat(np.arange(len(pairs)), [len(edges) for edges in marks])
     interior = level.interior.numpy()
     edge_owner, sharp = edge_owner[interior], _joined(marks)[interior]
-    edge_count = np.maximum(np.bincount(edge_owner, minlength=len(pairs)), 1)
+    turn = level.psi[:, 0].numpy()
+    edge_share = turn / np.maximum(np.bincount(edge_owner, turn), 1e-300)[edge_owner]
     return LimitBatch(
         count=len(pairs),
         level=level,
@@ -106,7 +107,7 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         area=torch.from_numpy(area / np.maximum(np.bincount(owner, area), 1e-300)[owner]),
         sharp=torch.from_numpy(sharp).double(),
         edge_owner=edge_owner,
-        edge_count=torch.from_numpy(edge_count).double(),
+        edge_share=torch.from_numpy(edge_share),
         tree=KDTree(surface),
         points=surface,
         normals=normals,

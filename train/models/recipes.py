@@ -102,7 +102,7 @@ def general(seed: int = 0) -> Recipe:
         gate_sharpness=1e7,
         training=ToLimit(
             weights=LimitWeights(
-                mean=1.0, spread=0.5, peak=0.7, normal=4.0, worse=1.5, worse_from=0.95, sharp=1.5
+                mean=1.0, spread=0.5, peak=0.7, normal=4.0, worse=1.5, worse_from=0.95, sharp=1.0
             ),
             faces=600,
             pool=80,

@@ -108,7 +108,7 @@ def _corners(rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return signs * size
     if kind < BOXES + PRISMS:
-        count, taper = int(rng.integers(3, 8)), rng.uniform(0.3, 1.0)
+        count, taper = int(rng.integers(3, 7)), rng.uniform(0.3, 1.0)
         angle = 2 * np.pi * np.arange(count) / count
         ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
         return np.concatenate([ring - [0, 0, 1], ring * [taper, taper, 1] + [0, 0, 1]]) * size

@@ -3,7 +3,7 @@
 An outline goes round a plan: barrels, bottles, cakes, limbs, cones, wheels, slices, rounded boxes,
 prisms, alone or several in one mesh. Corners of outline and plan stand for a smooth curve through
 them where they turn by less than `CRISP`, and are meant as they are where they turn by more: so
-eight sides are round and six are a hexagon, and rims stay crisp. Quads are cut one way, in turn or
+seven sides are round and six are a hexagon, and rims stay crisp. Quads are cut one way, in turn or
 at random, and lids from a middle, from a corner or by ears: sharpness has to follow none of these.
 """
 
@@ -26,14 +26,14 @@ Plan = Float[np.ndarray, "S 2"]
 Lid = Int[np.ndarray, "T 3"]
 
 # Sides from which on a part is round, and of the mesh that stands for it.
-ROUND, FINE = 8, 180
+ROUND, FINE = 7, 180
 FEWEST_SIDES, MOST_SIDES = 3, 36
 
 # Edges of the fine mesh that turn by more are sharp, radians.
 FINE_SHARP = np.radians(20)
 
-# Steps of a slice.
-MOST_STEPS = 6
+# Steps of a slice, as often as they stand here.
+STEPS = (2, 2, 3, 3, 4, 5, 6)
 
 # How often a lid has a vertex in its middle, and else is a fan from a corner.
 CENTRE, FAN = 0.4, 0.4
@@ -168,7 +168,7 @@ def _angular(rng: np.random.Generator) -> tuple[Plan, Plan]:
 
 def _slice(rng: np.random.Generator) -> tuple[Plan, Plan]:
     """Return a slice of a circle, in few steps."""
-    steps = int(rng.integers(2, MOST_STEPS + 1))
+    steps = int(rng.choice(STEPS))
     whole = steps * rng.uniform(np.radians(12), np.radians(min(45, 150 / steps)))
     middle = np.array([0.6, 0.0])
 

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 # Corners that turn by more are meant, radians.
-CRISP = np.radians(48)
+CRISP = np.radians(55)
 
 # Points of the fine outline to each piece that is no straight line.
 CURVED = 10

@@ -20,16 +20,16 @@ from train.data.pairs.solid import solid_pairs
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Callable[[np.random.Generator], Pair | None], float] = MappingProxyType(
     {
-        patch_pair: 0.09,
+        patch_pair: 0.12,
         grid_pair: 0.05,
         sphere_pair: 0.04,
-        faceted_pair: 0.06,
-        lathe_pair: 0.27,
+        faceted_pair: 0.05,
+        lathe_pair: 0.26,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
 SHARED: Mapping[Callable[[np.random.Generator], Iterator[Pair]], float] = MappingProxyType(
-    {machined_pairs: 0.14, solid_pairs: 0.35}
+    {machined_pairs: 0.14, solid_pairs: 0.34}
 )
 
 MOST_FACES = 1200
