@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from pns_common import Mesh, loop, pns
 from tests.support.meshes import bent, bumpy_sphere, grid, rotation, soups
-from train.ablations.variants import (
+from train.experiments.harness.variants import (
     PNS,
     UNCONSTRAINED,
     VARIANTS,
