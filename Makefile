@@ -24,7 +24,7 @@ PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist l
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
 	@$(SERVE)/bin/python -m pns_common.warming
-	@$(SERVE)/bin/pns doctor > /dev/null  # refines a file: the service's own kernels
+	@$(SERVE)/bin/pns doctor > /dev/null  # the kernels of files
 	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take
@@ -187,6 +187,7 @@ web/node_modules/.ready: web/package-lock.json
 
 # Inference only: no torch.
 $(SERVE)/.ready: pyproject.toml setup.py constraints.txt
+	@echo "Installing into $(SERVE), once: some 500 MB, a minute or two"
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
 	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store]'
@@ -204,6 +205,7 @@ $(INTEROP)/.ready: pyproject.toml setup.py constraints.txt requirements/interop.
 	touch $@
 
 $(DEV)/.ready: pyproject.toml setup.py constraints.txt
+	@echo "Installing into $(DEV), once: some gigabytes with torch, some minutes"
 	$(PYTHON) -m venv $(DEV)
 	$(DEV)/bin/python -m pip install $(HASHED)
 	$(DEV)/bin/python -m pip install --quiet torch==2.13.0

@@ -1,1 +1,1 @@
-"""What brings the operator into other programs."""
+"""Add-ons that bring the operator into other programs."""

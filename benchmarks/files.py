@@ -42,7 +42,7 @@ class MemoryCourse(Course):
 
 @dataclass(frozen=True)
 class MeasuredFile:
-    """What one file took, medians of its runs; ``refused`` says why where it was not refined."""
+    """Cost of one file, medians of its runs; ``refused`` says why it was not refined."""
 
     faces: int = 0
     seconds: dict[str, float] = field(default_factory=dict)

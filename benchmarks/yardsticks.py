@@ -1,4 +1,4 @@
-"""What the machine can do at this moment, for ratios that survive a busy hour."""
+"""Measure the machine's speed at this moment, for ratios that survive a busy hour."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from train.models.networks import BoundedNet, SharpNet
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What was written."""
+    """A model file that was written."""
 
     sha256: str
     parity: Parity

@@ -102,7 +102,7 @@ class ColumnRefinement:
 
     @property
     def count(self) -> int:
-        """How many refined vertices there are."""
+        """Number of refined vertices."""
         return self.last.vertex_count
 
     def __call__(self, columns: Real[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:

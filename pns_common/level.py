@@ -158,7 +158,7 @@ class Level:
 
     @cached_property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
-        """Whether the faces of each vertex form more than one fan."""
+        """True for vertices whose faces form more than one fan."""
         return self.topology.multi_fans(self.blocks.quiet())
 
     @cached_property

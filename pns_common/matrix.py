@@ -54,7 +54,7 @@ class SubdivisionMatrix:
 
     @property
     def starts(self) -> Integer[np.ndarray, " R"]:
-        """Where the entries of each row begin, and after the last row where they end."""
+        """Start of each row's entries, and the end of the last row's."""
         return np.searchsorted(self.rows, np.arange(self.shape[0] + 1))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from importlib import import_module
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -101,13 +102,21 @@ class Mesh:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:
-        """Read the faces of a file by meshio: OBJ, PLY, STL, OFF and others, by its ending.
+        """Read the faces of a file, by its ending: OBJ, or what meshio reads, as PLY, STL and OFF.
 
         Raises:
-            ImportError: meshio is not installed.
-            MeshError: as ``Mesh``.
+            ImportError: meshio is wanted and not installed.
+            MeshError: as ``Mesh``, or meshio cannot read the file.
         """
-        read = import_module("meshio").read(path)
+        path = Path(path)
+        if path.suffix.lower() == ".obj":
+            return cls(*_read_obj(path))
+        meshio = _meshio()
+        try:
+            read = meshio.read(path)
+        except (meshio.ReadError, ValueError) as error:
+            advice = f"{path}: meshio cannot read it: {error}; `pns subdivide` may"
+            raise MeshError(advice) from error
         wanted = {*CELLS.values(), "polygon"}
         blocks = [block.data for block in read.cells if block.type in wanted]
         faces = blocks[0] if len(blocks) == 1 else [face for block in blocks for face in block]
@@ -122,7 +131,7 @@ class Mesh:
         alike = None if self._faces is None else [(self._faces.shape[1], self._faces)]
         runs = alike or groupby(self.polygons, len)
         cells = [(CELLS.get(count, "polygon"), np.array([*rows], np.int32)) for count, rows in runs]
-        import_module("meshio").write_points_cells(path, self.vertices, cells)
+        _meshio().write_points_cells(path, self.vertices, cells)
 
     def triangulated(self) -> Mesh:
         """Cut each face into triangles that meet in its first corner: right for convex faces."""
@@ -132,7 +141,7 @@ class Mesh:
 
     @property
     def offsets(self) -> Integer[np.ndarray, " F1"]:
-        """Where the corners of each face begin, and where the last ones end: (F + 1,)."""
+        """Start of each face's corners, and the end of the last ones: (F + 1,)."""
         if self._offsets is not None:
             return self._offsets
         return np.arange(0, len(self.corners) + 1, int(self.faces.shape[1]))
@@ -160,7 +169,7 @@ class Mesh:
 
     @property
     def triangles(self) -> bool:
-        """Whether all faces are triangles."""
+        """True where all faces are triangles."""
         return self._faces is not None and self._faces.shape[1] == TRIANGLE
 
     def topology(self, blocks: Blocks | None = None) -> Topology:
@@ -174,6 +183,37 @@ class Mesh:
     ) -> Mesh:
         """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
         return _kept(vertices, faces.reshape(-1), None, faces.shape[1])
+
+
+def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:
+    """Return the vertices and faces of an OBJ in its order, without what its corners carry.
+
+    Raises:
+        MeshError: a face or vertex that is none, with its line.
+    """
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            kind, *fields = line.partition("#")[0].split() or [""]
+            try:
+                if kind == "v":
+                    x, y, z = map(float, fields[:3])
+                    vertices.append([x, y, z])
+                elif kind == "f":
+                    corners = [int(field.partition("/")[0]) for field in fields]
+                    # Negative ones count from the last vertex so far.
+                    faces.append([c - 1 if c > 0 else len(vertices) + c for c in corners])
+            except ValueError as error:
+                raise MeshError(str(error), element="line", index=number) from error
+    return vertices, faces
+
+
+def _meshio() -> Any:
+    try:
+        return import_module("meshio")
+    except ImportError as error:
+        raise ImportError("files other than OBJ need meshio: pip install meshio") from error
 
 
 def _kept(

@@ -93,7 +93,7 @@ class Rule:
 
 @dataclass(frozen=True, eq=False)
 class Additions:
-    """What a level adds: rows of old vertices first, then of edge vertices and face vertices.
+    """Corrections of a level: rows of old vertices, then of edge vertices and face vertices.
 
     Attributes:
         points: x.

@@ -24,7 +24,7 @@ def no_progress(rows: int) -> None:
 
 @dataclass(frozen=True)
 class Blocks:
-    """How row-wise work is shared: worker threads, and blocks of rows.
+    """Division of row-wise work: worker threads, and blocks of rows.
 
     Attributes:
         threads: workers, the calling thread among them.

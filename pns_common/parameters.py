@@ -1,4 +1,4 @@
-"""What counts as a number, or as yes or no, in an argument."""
+"""Check that an argument is a number, or yes or no."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from jaxtyping import Float, Integer
 
 from pns_common.creases import Creases, chosen_creases
 from pns_common.errors import MeshError, ParameterError
-from pns_common.kernels import are_compiled
+from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.kernels import loop as kernels
 from pns_common.level import Level
 from pns_common.limit import limit_normals, limit_positions, limit_shift
@@ -310,7 +310,7 @@ def refine_many(
 def _announce_compiling() -> None:
     """Say once that the first refinement after an installation compiles the kernels."""
     if not are_compiled():
-        logging.getLogger("pns_common").info("Compiling kernels, once: some fifteen seconds")
+        logging.getLogger("pns_common").info(ANNOUNCEMENT)
 
 
 def _step(level: Level, scheme: Scheme, depth: int) -> Step:

@@ -58,7 +58,7 @@ class VertexSummary(TypedDict):
 
 
 class Distances(TypedDict):
-    """How far a level is from the smooth base scheme; see LevelReport."""
+    """Distances of a level from the smooth base scheme; see LevelReport."""
 
     displacement_max: NotRequired[float]
     envelope_max: NotRequired[float]
@@ -94,7 +94,7 @@ class LevelReport(Distances):
 
 
 class LimitDistances(TypedDict):
-    """How far all levels together are from the smooth base scheme; see Report."""
+    """Distances of all levels together from the smooth base scheme; see Report."""
 
     learned_levels: int
     limit_distance: float

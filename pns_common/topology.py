@@ -93,7 +93,7 @@ class Topology:
 
     @property
     def triangles(self) -> bool:
-        """Whether all faces are triangles."""
+        """True where all faces are triangles."""
         return len(self.face_of_corner) == 0
 
     @property
@@ -185,7 +185,7 @@ class Topology:
 
     @cached_property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
-        """Whether a vertex's faces form more than one fan, as at the knot of a bow-tie."""
+        """True for vertices whose faces form more than one fan, as at the knot of a bow-tie."""
         return self.multi_fans(Blocks())
 
     def multi_fans(self, blocks: Blocks) -> Bool[np.ndarray, " V"]:

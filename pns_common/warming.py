@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from pns_common.kernels import are_compiled
+from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
 from pns_common.refinement import refine
 from pns_common.schemes import catmull_clark, loop, pns
 
-ANNOUNCEMENT = "Compiling kernels, once: some fifteen seconds"
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 CLOSED, SHEET = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], [[0, 1, 2], [2, 1, 3]]
 
 
@@ -50,6 +51,9 @@ def _stages() -> Iterator[Callable[[], object]]:
     yield lambda: refine(sheet, loop(), 1, limit=True)
     yield lambda: refine(closed, loop(), 1, limit=True, creases=crease)
     yield lambda: refine(Mesh(VERTICES, CLOSED[:3]), catmull_clark(), 2, creases=crease).report
+    quads = Mesh(CUBE, QUADS)
+    yield lambda: refine(quads, pns(load_model()), 1).report
+    yield lambda: refine(quads, pns(load_model()), 1, creases=None, limit=True)
 
 
 if __name__ == "__main__":

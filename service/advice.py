@@ -23,7 +23,7 @@ MOST_OPEN = 0.9
 
 @dataclass(frozen=True)
 class Bends:
-    """How many edges of a control mesh bend, and how many of these are kept sharp."""
+    """Number of bent edges of a control mesh, and of those that are kept sharp."""
 
     bent: int = 0
     sharp: int = 0
@@ -61,12 +61,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     total = creases + sum(edges[kind] for kind in ("interior", "boundary", "irregular"))
     if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
         return [
-            f"{bends.sharp} of {bends.bent} bent edges are kept sharp: "
+            f"{bends.sharp:,} of {bends.bent:,} bent edges are kept sharp: "
             "use crease=off for a rounder shape"
         ]
     if edges["boundary"] >= MOST_OPEN * total:
         return [
-            f"{edges['boundary']} of {total} edges are open borders, and faces that only touch "
+            f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
         ]
     if levels[-1]["normal_jump_max"] < BENT and not creases and not edges.get("soft"):

@@ -1,4 +1,4 @@
-"""How the work on a file goes: the stage it is in, the share that is done, seconds by stage."""
+"""Progress of the work on a file: its stage, the share that is done, seconds by stage."""
 
 from __future__ import annotations
 

@@ -73,7 +73,8 @@ def _settings() -> str:
 
 def _kernels() -> str:
     from pns_common.kernels import are_compiled
-    from pns_common.warming import warm_up
+
+    from .warming import warm_up
 
     began, kept = time.perf_counter(), are_compiled()
     warm_up(lambda _: None)

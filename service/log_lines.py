@@ -1,10 +1,14 @@
-"""Log lines: one JSON object each, whatever is in it, and never longer than `LONGEST`."""
+"""Log lines: one JSON object each, whatever is in it, and never longer than `LONGEST`.
+
+At a terminal they are text, with the same escapes.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
 import logging.config
+import sys
 from datetime import UTC, datetime
 from typing import Any
 
@@ -38,14 +42,28 @@ class JsonLines(logging.Formatter):
         return json.dumps(fields, default=str).replace("\x7f", "\\u007f")
 
 
+class TerminalLines(JsonLines):
+    """A record as text for a terminal: time of day, message, and fields as JSON."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        fields = json.loads(super().format(record))
+        del fields["logger"]
+        time, level, message = (fields.pop(name) for name in ("time", "level", "message"))
+        time = time.partition("T")[2].partition(".")[0] + "Z"
+        told = "".join(f" {name}={json.dumps(value)}" for name, value in fields.items())
+        return f"{time} {level}: {ascii(message)[1:-1]}{told}".replace("\x7f", "\\u007f")
+
+
 def configure() -> None:
-    """Send every logger's lines to stderr as JSON; uvicorn's own among them."""
+    """Send every logger's lines to stderr, uvicorn's too: as text to a terminal, else as JSON."""
+    formatter = TerminalLines if sys.stderr.isatty() else JsonLines
     logging.config.dictConfig(
         {
             "version": 1,
             "disable_existing_loggers": False,
-            "formatters": {"json": {"()": JsonLines}},
-            "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+            "formatters": {"lines": {"()": formatter}},
+            "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "lines"}},
             "root": {"handlers": ["stderr"], "level": logging.WARNING},
             "loggers": {
                 "pns": {"level": logging.INFO},

@@ -1,4 +1,4 @@
-"""What a request may ask for, and what it may cost."""
+"""Options of a refinement, and limits on its cost."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ DEFAULTS = Options()
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one job may cost; checked against predictions, before the memory is allocated.
+    """Limits on the cost of one job; checked against predictions, before memory is allocated.
 
     Bytes for `max_memory_bytes`; counts for the others. `max_json_items` bounds the characters that
     open or separate values in the JSON text, `max_json_depth` how deep it nests.

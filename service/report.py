@@ -31,7 +31,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class MeshResult:
-    """What became of one mesh of the file.
+    """Report of one mesh of the file.
 
     Attributes:
         index: its place in `meshes`.

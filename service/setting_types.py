@@ -1,4 +1,4 @@
-"""What the text of a setting may be, and what is said of one that is not."""
+"""Types of settings: how their text is read, and errors."""
 
 from __future__ import annotations
 

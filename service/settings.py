@@ -1,4 +1,4 @@
-"""What a deployment may set, by environment (`PNS_…`) or by the constructor."""
+"""Settings of a deployment, by environment (`PNS_…`) or by the constructor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _worker_default() -> int:
 
 
 class StartError(Exception):
-    """What is set cannot be had on this machine."""
+    """A setting that this machine cannot fulfil."""
 
 
 class Settings(BaseSettings):

@@ -1,4 +1,4 @@
-"""What keeping everything costs on a large mesh, and how long the interface stands still meanwhile.
+"""Measure the time of a refinement on a large mesh, and how long the interface stands still.
 
 PYTHON addons/blender/measure.py ZIP      # `make blender-measure`; prints figures and judges none
 

@@ -1,4 +1,4 @@
-"""Which peers are set up: drivers that `make bench` built, libraries in its environment."""
+"""List the peers that are set up: drivers that `make bench` built, libraries in its environment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every Python peer shares: see driver.hpp, whose file and whose lines these are.
+"""Protocol of the Python peers: see driver.hpp, whose file and whose lines these are.
 
 Imported in the peers' own environment too: numpy and the standard library only.
 """

@@ -22,6 +22,8 @@ from numba import config, njit  # pyright: ignore[reportMissingTypeStubs]
 kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
 inlined: Any = njit(nogil=True, error_model="numpy", forceinline=True)
 
+ANNOUNCEMENT = "Compiling kernels, once: about half a minute"
+
 
 def are_compiled() -> bool:
     """Return whether compiled code is kept from an earlier run."""

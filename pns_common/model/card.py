@@ -33,7 +33,7 @@ MOST_SHARPNESS_LEVELS = 16
 
 @dataclass(frozen=True)
 class ModelCard:
-    """What a model file says of itself. Fields after ``metrics`` belong to format 4 alone.
+    """Card of a model file. Fields after ``metrics`` belong to format 4 alone.
 
     Attributes:
         format: Version of the file format, 1 or 4.

@@ -1,1 +1,1 @@
-"""What a request sends: media types, parts, archives, and the files beside a document."""
+"""Bodies of requests: media types, parts, archives, and the files beside a document."""

@@ -24,7 +24,7 @@ class File:
 
 @dataclass(frozen=True)
 class SiblingFiles:
-    """What lies beside a document.
+    """Files beside a document.
 
     Attributes:
         find: the file of a safe relative name, None where there is none.

@@ -1,4 +1,4 @@
-"""What a request's body holds: a document, and perhaps files beside it."""
+"""Read a request's body: a document, and perhaps files beside it."""
 
 from __future__ import annotations
 

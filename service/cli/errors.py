@@ -34,7 +34,7 @@ def _explained(error: Exception) -> tuple[str, int] | None:
     from ..errors import InvalidParameter, LimitError, ServiceError
     from ..http.access.keys import KeysError
     from ..http.watch.tracing import TracingError
-    from ..settings import StartError
+    from ..settings import PREFIX, StartError
 
     match error:
         case InvalidParameter() | ParameterError():
@@ -43,7 +43,7 @@ def _explained(error: Exception) -> tuple[str, int] | None:
             first = error.errors()[0]
             name = ".".join(str(part) for part in first["loc"])
             text = first["msg"].removeprefix("Value error, ")
-            return f"setting {name}: {text}" if name else text, USAGE_ERROR
+            return f"{PREFIX}{name.upper()}: {text}" if name else text, USAGE_ERROR
         case LimitError(limit=limit) if limit in _SETTING_OF_LIMIT:
             return f"{error}; {_SETTING_OF_LIMIT[limit]} allows more", FAILURE
         case ServiceError() | PnsError() | KeysError() | TracingError() | StartError():

@@ -90,7 +90,7 @@ class Admission:
 
 
 class Body:
-    """What is counted of one body."""
+    """Counts of one body."""
 
     def __init__(self, client: str, bodies: _Bodies) -> None:
         self.client = client

@@ -1,4 +1,4 @@
-"""What an answer is sent as: the file, the file as plain bytes, or its report."""
+"""Choose an answer's media type: the file, the file as plain bytes, or its report."""
 
 from __future__ import annotations
 

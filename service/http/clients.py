@@ -1,4 +1,4 @@
-"""Who asks: the one that turns and budgets are counted for."""
+"""Identify the client for which turns and budgets are counted."""
 
 from __future__ import annotations
 

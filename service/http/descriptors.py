@@ -1,4 +1,4 @@
-"""How many connections fit under the limit on open files, so that accepting never fails."""
+"""Fit connections under the limit on open files, so that accepting never fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What /docs shows beside the parameters: bodies, answers and every error of each route."""
+"""Describe bodies, answers and every error of each route for /docs."""
 
 from __future__ import annotations
 

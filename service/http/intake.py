@@ -28,7 +28,7 @@ from .service import Service
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a request wants made, and where: in a `folder` on disk, or (None) in memory.
+    """Result that a request wants: in a `folder` on disk, or (None) in memory.
 
     `patience` is how long its job may take from its admission, waiting included.
     """
@@ -41,7 +41,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a job is made of beside its body; another replica may make it again."""
+    """Parameters of a job beside its body; another replica may make it again."""
 
     client: str
     options: Options

@@ -1,4 +1,4 @@
-"""How long a client may keep the service waiting for its body."""
+"""Limit the time for which a client keeps the service waiting for its body."""
 
 from __future__ import annotations
 

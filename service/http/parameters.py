@@ -44,7 +44,7 @@ def _length(value: Any) -> float | Literal["auto"]:
 
 
 class Parameters(BaseModel):
-    """What a client may ask for; another name is an error, since a misspelt one would be lost."""
+    """Parameters of a request; another name is an error, since a misspelt one would be lost."""
 
     model_config = ConfigDict(extra="forbid")
 

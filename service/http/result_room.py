@@ -1,4 +1,4 @@
-"""How many bytes of results fit on their disk, so that keeping old ones never fails new ones."""
+"""Fit the bytes of results on their disk, so that keeping old ones never fails new ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long each stage of a job took, as a header says it."""
+"""Write the seconds of a job's stages as a header."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the 4^L descendants of one triangle lie: the grid of barycentric points after L splits.
+"""Barycentric grid of the 4^L descendants of one triangle after L splits.
 
 Linear attributes need no level-by-level refinement: midpoints of midpoints are the points of this
 grid. It is made by the operator's own split, so faces and corners come in the operator's order.

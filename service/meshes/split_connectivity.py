@@ -77,7 +77,7 @@ class SplitConnectivity:
 
     @property
     def _edge_parameters(self) -> Float[np.ndarray, " n"]:
-        """Where the n − 1 vertices of an edge lie, from 0 at its lower corner to 1."""
+        """Positions of the n − 1 vertices of an edge, from 0 at its lower corner to 1."""
         return np.arange(1, self.grid.segments) / self.grid.segments
 
 

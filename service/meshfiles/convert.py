@@ -18,6 +18,7 @@ import numpy as np
 from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
+from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.matrix import SubdivisionMatrix
 from pns_common.model.session import Model
 from pns_common.schemes import Scheme
@@ -54,7 +55,7 @@ STREAM = Path("-")
 
 @dataclass(frozen=True)
 class Jobs:
-    """What `pns subdivide` is asked for.
+    """Arguments of `pns subdivide`.
 
     Attributes:
         sources: files to read; `-` is stdin.
@@ -99,6 +100,8 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
+    if not are_compiled():
+        console.print(ANNOUNCEMENT)
     for job in planned:
         try:
             _convert_one(job, jobs, options, loaded, limits, console)

@@ -1,4 +1,4 @@
-"""How many triangles a mesh file will give, counted without reading its numbers."""
+"""Count the triangles that a mesh file will give, without reading its numbers."""
 
 from __future__ import annotations
 

@@ -217,7 +217,7 @@ def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class _Where:
-    """Where a copy of a mesh stands: its node's name, its matrix, its morphs, and its joints."""
+    """Placement of a copy of a mesh: its node's name, its matrix, its morphs, and its joints."""
 
     name: str
     matrix: Float[np.ndarray, "4 4"]

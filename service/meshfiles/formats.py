@@ -29,7 +29,7 @@ _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex c
 
 @dataclass(frozen=True)
 class Format:
-    """What a format can hold, and what reading takes.
+    """A format: what it can hold, and what reading takes.
 
     Attributes:
         layers: those of corners; None: any.

@@ -32,7 +32,7 @@ class Layer:
 
     @property
     def complete(self) -> bool:
-        """Whether every corner has a value."""
+        """True where every corner has a value."""
         return bool((self.rows >= 0).all())
 
 
@@ -78,7 +78,7 @@ class MeshFile:
 
     @property
     def sizes(self) -> Int[np.ndarray, " F"]:
-        """How many corners each polygon has."""
+        """Number of corners of each polygon."""
         return np.diff(self.offsets)
 
     @property

@@ -1,4 +1,4 @@
-"""Where a skin puts a mesh while its joints stand as their nodes do (glTF 2.0 §3.7.3.3).
+"""Pose a skinned mesh as its joints' nodes stand (glTF 2.0 §3.7.3.3).
 
 The node that shows a skinned mesh does not move it, whatever its transform says.
 """

@@ -25,7 +25,7 @@ from .told import Summary, count_aside, line_of, progress
 
 @dataclass(frozen=True)
 class Batch:
-    """What a batch does to each file.
+    """Options that a batch applies to each file.
 
     Attributes:
         source, destination: paths or URLs; a folder, glob or manifest, and a folder.

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..bodies.media import ALIASES, KINDS, kind_of
 from ..errors import LONGEST, InvalidParameter, LimitError, NoModelError, ServiceError
 from ..options import Limits, Options
-from .same_model import check_same_model
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
@@ -35,7 +34,7 @@ class Known(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker is told of one file.
+    """Task of a worker: one file.
 
     Attributes:
         url, output: where it is read, where its result goes.
@@ -61,7 +60,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What became of one file: a row of the report.
+    """Outcome of one file: a row of the report.
 
     `code`, `detail` and `pointer` are those of the service's problems, and empty for what went
     well; `changes` says what was changed or lost on the way, a line each; `limit_distance` is the
@@ -139,7 +138,11 @@ def _refine(task: Task) -> Row:
     if _is_done(task.known, digest, output):
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
     model = _model(task.model) if task.options.learns else None
-    check_same_model(task.model, None if model is None else model.hash, task.model_hash)
+    if (None if model is None else model.hash) != task.model_hash:
+        raise NoModelError(
+            f"{task.model or 'the default model'}: it is not the model that this run began with; "
+            "it was replaced, or is another one on a worker's machine"
+        )
     try:
         with memory_cap(task.limits.max_memory_bytes):
             written = converted(

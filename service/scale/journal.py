@@ -1,4 +1,4 @@
-"""What is known of each file, kept while a batch runs: a run that is killed goes on from here.
+"""Journal of a batch: a run that is killed continues from here.
 
 SQLite, so that two runs at once do no harm and memory does not grow with the number of files. The
 report is written from it at the end, in whole.

@@ -34,17 +34,17 @@ class Place:
 
     @property
     def local(self) -> bool:
-        """Whether it lies on this machine's own disks."""
+        """True where it lies on this machine's own disks."""
         return isinstance(self.system, LocalFileSystem)
 
     @property
     def url(self) -> str:
-        """How it is called outside: a plain path where it is local."""
+        """Name outside: a plain path where it is local."""
         return self.path if self.local else str(self.system.unstrip_protocol(self.path))
 
     @property
     def read_only(self) -> bool:
-        """Whether nothing can be written there."""
+        """True where nothing can be written there."""
         protocols = self.system.protocol
         named = (protocols,) if isinstance(protocols, str) else protocols
         return any(name in READ_ONLY for name in named)

@@ -1,4 +1,4 @@
-"""Where a report may be written: asked for before the work."""
+"""Check that a report may be written to its place, before the work."""
 
 from __future__ import annotations
 

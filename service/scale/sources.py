@@ -1,4 +1,4 @@
-"""What a batch works through: a folder, a glob, or a manifest, one item at a time.
+"""Sources of a batch: a folder, a glob, or a manifest, one item at a time.
 
 Nothing is collected: a manifest of a million rows takes the memory of one.
 """

@@ -1,4 +1,4 @@
-"""What is told of a batch on a terminal: how far it is, what fails, and all in the end."""
+"""Show a batch on a terminal: its progress, its failures, and a summary."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .sources import Item
 
 @dataclass(frozen=True)
 class Summary:
-    """How many files ended how, the faces of their results, the failures by code; the report."""
+    """Summary of a batch: files by outcome, faces of the results, failures by code; the report."""
 
     report: Path
     counts: dict[str, int]

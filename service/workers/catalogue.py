@@ -1,4 +1,4 @@
-"""What GET /models answers: which models a request may name, and what each says of itself."""
+"""Catalogue for GET /models: the models that a request may name, with their cards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a job will cost: a prediction, for the order of jobs and for the budgets of clients."""
+"""Predict the cost of a job, for the order of jobs and for the budgets of clients."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class _Turn:
 
 
 class Desk:
-    """Where jobs are handed in.
+    """Take jobs in.
 
     Args:
         workers: those for any job, and the one for short jobs.
@@ -78,7 +78,7 @@ class Desk:
 
     @property
     def ready(self) -> bool:
-        """Whether a job would start at once: all lanes have warmed up, and one for any job lives.
+        """True where a job would start at once: all lanes are warm, and one for any job lives.
 
         The lane of short jobs measures each job first. Once warm, it is back within seconds
         whatever kills its worker; that must not take the service out of a cluster.
@@ -88,17 +88,17 @@ class Desk:
 
     @property
     def restarts(self) -> Counter[str]:
-        """How often a worker was replaced, by cause."""
+        """Number of replaced workers, by cause."""
         return sum((workers.restarts for workers in self._workers.values()), Counter())
 
     @property
     def waiting(self) -> int:
-        """How many jobs wait."""
+        """Number of jobs that wait."""
         return self.turns.waiting
 
     @property
     def running(self) -> int:
-        """How many jobs run or are measured."""
+        """Number of jobs that run or are measured."""
         return self.turns.running.total()
 
     async def serve(self, job: Job) -> None:

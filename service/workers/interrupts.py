@@ -1,4 +1,4 @@
-"""What a terminal sends to the workers of a process too: Ctrl-C, and that it closes."""
+"""Signals that a terminal sends to the workers of a process too: Ctrl-C, and that it closes."""
 
 from __future__ import annotations
 

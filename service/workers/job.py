@@ -16,7 +16,7 @@ from .turns import Waiting
 
 
 class State(StrEnum):
-    """What has become of a job."""
+    """State of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -26,7 +26,7 @@ class State(StrEnum):
 
     @property
     def ended(self) -> bool:
-        """Whether it stays what it is."""
+        """True for states that are final."""
         return self in (State.DONE, State.FAILED, State.CANCELLED)
 
 

@@ -64,7 +64,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What is known of a job that was done.
+    """Result of a job that was done.
 
     The seconds of each stage, the model, the faces that came and those that were made.
     """
@@ -183,10 +183,8 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from pns_common import warm_up as compile_kernels
-
-    from ..gltf import subdivide  # noqa: F401
     from ..meshfiles import to_gltf  # noqa: F401
+    from ..warming import warm_up as compile_kernels
 
     compile_kernels(log.info)
     hold_model(model, providers)

@@ -29,7 +29,7 @@ class ForeignFileError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class FileName:
-    """How another process finds a memory file, and knows it: its path, its device and inode."""
+    """Name by which another process opens a memory file: its path, its device and inode."""
 
     path: str
     device: int
@@ -93,7 +93,7 @@ class MemoryFile:
 
     @property
     def closed(self) -> bool:
-        """Whether everybody has let go."""
+        """True once all holders have let go."""
         return self._holders == 0
 
     def append(self, data: bytes) -> None:

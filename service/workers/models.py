@@ -40,7 +40,7 @@ class Models:
 
     @property
     def sources(self) -> dict[str, Model | str]:
-        """What each name stands for; a bundled name wins over that of a served file."""
+        """Source of each name; a bundled name wins over that of a served file."""
         from pns_common.model.file import bundled_models
 
         served, names = self.served, bundled_models()

@@ -1,4 +1,4 @@
-"""What becomes of a worker whose parent is gone: its work is nobody's any more."""
+"""End a worker whose parent is gone, since its work is needed no more."""
 
 from __future__ import annotations
 

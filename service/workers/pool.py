@@ -64,7 +64,7 @@ class Workers:
 
     @property
     def ready(self) -> bool:
-        """Whether a worker that has warmed up is alive."""
+        """True while a worker that has warmed up is alive."""
         return any(pool.active for pool in self._warm)
 
     def start(self) -> None:

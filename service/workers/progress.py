@@ -1,4 +1,4 @@
-"""How far a job is, in a page of memory that its worker writes and the server reads.
+"""Progress of a job, in a page of memory that its worker writes and the server reads.
 
 Nothing is sent, so nothing waits: a worker inside one long numpy call and a server with a thousand
 clients hinder each other in nothing. The other way round the page carries one word: to stop.
@@ -64,7 +64,7 @@ class ProgressPage:
 
     @property
     def stage(self) -> str | None:
-        """What the worker does now; None before it begins."""
+        """Stage of the worker; None before it begins."""
         if self._words is None:
             return self._last[0]
         number = self._words[_STAGE]

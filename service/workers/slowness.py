@@ -1,4 +1,4 @@
-"""How fast this machine is: seconds here for each that was predicted, learnt from the jobs."""
+"""Speed of this machine: seconds here for each that was predicted, learnt from the jobs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whose turn it is: the order of the jobs that wait for a worker.
+"""Order of the jobs that wait for a worker.
 
 Weighted fair queueing (Demers, Keshav and Shenker 1989), with a job's predicted seconds for a
 packet's length: each client advances by what its jobs cost, and who has advanced least is next. So
@@ -19,7 +19,7 @@ from ..errors import BusyError
 
 
 class Lane(Enum):
-    """Which workers a job runs on: those for any job, or the one for short ones."""
+    """Lanes: workers for any job, or the one for short ones."""
 
     ANY = "any"
     SHORT = "short"
@@ -37,7 +37,7 @@ class Waiting:
 
     @property
     def lane(self) -> Lane:
-        """Where its turn is, once it has come."""
+        """Lane of its turn, once it has come."""
         return self.turn.result()
 
 
@@ -64,7 +64,7 @@ class Turns:
 
     @property
     def waiting(self) -> int:
-        """How many wait and take a slot."""
+        """Number of those that wait and take a slot."""
         return sum(job.counted for job in self._waiting)
 
     def backlog(self, before: Waiting | None = None, *, short: bool = False) -> float:

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -133,6 +134,30 @@ def test_a_saved_mesh_is_loaded_as_it_was(tmp_path, ending):
         again = Mesh.load(tmp_path / f"mesh.{ending}")
         np.testing.assert_array_equal(again.vertices, points)
         assert [face.tolist() for face in again.polygons] == faces
+
+
+def test_an_obj_with_texture_coordinates_is_loaded(tmp_path):
+    path = tmp_path / "mesh.OBJ"
+    seam = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 2 2"
+    path.write_text(
+        f"# a sheet\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n{seam}\nf 1/1 2/2 3/3\nf -4/5 -2//1 -1\n"
+    )
+    mesh = Mesh.load(path)
+    np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3]])
+    path.write_text("v 0 0 0\nf 1 two 3\n")
+    with pytest.raises(MeshError, match=r"line 2: .*two"):
+        Mesh.load(path)
+
+
+def test_a_file_that_meshio_cannot_read_is_named(tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+    (tmp_path / "mesh.glb").write_bytes(b"glTF")
+    with pytest.raises(MeshError, match=r"mesh\.glb.*`pns subdivide` may"):
+        Mesh.load(tmp_path / "mesh.glb")
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(ImportError, match="pip install meshio"):
+        Mesh.load(tmp_path / "mesh.ply")
 
 
 def test_a_saved_file_is_read_by_others(tmp_path):

@@ -117,7 +117,7 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     await page.locator("#legend", { hasText: "Share of its limit used" }).waitFor();
     await page.selectOption("#look", "distance");
-    await page.locator("#legend", { hasText: "Distance to classic" }).waitFor({ timeout: 5000 });
+    await page.locator("#legend", { hasText: "Distance to classic" }).waitFor();
     await page.selectOption("#pair", "loop");
     assert.match(await page.textContent("#label-left"), /^Classic/);
   });

@@ -19,7 +19,7 @@ SUN, SKY = 1.7, 0.36
 
 @dataclass(frozen=True)
 class Quality:
-    """How a picture is made: by ``CYCLES`` or by Eevee's name, of so many samples a pixel."""
+    """Renderer of a picture: ``CYCLES`` or Eevee's name, and the samples of a pixel."""
 
     engine: str = "CYCLES"
     samples: int = 32

@@ -1,4 +1,4 @@
-"""What one control mesh becomes: itself, Loop, an untrained control, and the learned operator."""
+"""Variants of one control mesh: itself, Loop, an untrained control, and the learned operator."""
 
 from __future__ import annotations
 

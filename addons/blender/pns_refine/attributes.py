@@ -13,7 +13,7 @@ from .refining.snapshot import Domain, Layer, Rule
 
 @dataclass(frozen=True)
 class Kind:
-    """How an attribute of one type is read: the field, its width and its type."""
+    """Layout of an attribute of one type: the field, its width and its type."""
 
     field: str
     width: int

@@ -1,4 +1,4 @@
-"""What does not come through refinement unchanged, in words: for the report panel."""
+"""Sentences on data that a refinement changes or drops, for the report panel."""
 
 from __future__ import annotations
 

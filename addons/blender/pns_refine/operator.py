@@ -57,7 +57,7 @@ def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 class Refining(Settings):
-    """What both forms of the operator have."""
+    """Base of both forms of the operator."""
 
     keep_original: BoolProperty(
         name="Keep Original",

@@ -57,7 +57,7 @@ class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's na
 
 
 class VIEW3D_PT_pns_overlay(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
-    """Which diagnostic is shown, with its legend."""
+    """Panel of the diagnostic that is shown, with its legend."""
 
     bl_label = "Overlay"
     bl_parent_id = "VIEW3D_PT_pns"

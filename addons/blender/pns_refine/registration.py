@@ -1,4 +1,4 @@
-"""What Blender is told of, and what it is told to forget."""
+"""Register the extension's classes with Blender, and unregister them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is remembered of a refinement, on the mesh that it made."""
+"""Record of a refinement, kept on the mesh that it made."""
 
 from __future__ import annotations
 

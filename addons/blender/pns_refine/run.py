@@ -87,7 +87,7 @@ class Run:
 
 @dataclass
 class Share:
-    """How much of a run is done, for whoever shows it."""
+    """Progress of a run, as a share."""
 
     value: float = 0.0
     text: str = ""

@@ -1,4 +1,4 @@
-"""What the user chooses, for the operator and for live mode alike."""
+"""Settings of the operator and of live mode."""
 
 from __future__ import annotations
 

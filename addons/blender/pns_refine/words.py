@@ -1,4 +1,4 @@
-"""What the interface says in sentences. Knows no Blender: lengths come as texts."""
+"""Sentences of the interface. Knows no Blender: lengths come as texts."""
 
 from __future__ import annotations
 

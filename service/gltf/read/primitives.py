@@ -45,7 +45,7 @@ class TrianglePrimitive:
 
     @property
     def is_double(self) -> bool:
-        """Whether positions are doubles, as in text files; those of a glTF never are."""
+        """True where positions are doubles, as in text files; those of a glTF never are."""
         return self.attributes["POSITION"].itemsize == 8
 
 

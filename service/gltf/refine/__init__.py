@@ -1,1 +1,1 @@
-"""What becomes of a glTF mesh and of all that follows its vertices."""
+"""Refine a glTF mesh and all that follows its vertices."""

@@ -79,7 +79,7 @@ class SkinAndMorph:
 
     @property
     def any(self) -> bool:
-        """Whether there is a skin or a morph target."""
+        """True where there is a skin or a morph target."""
         return self.binding is not None or bool(self.deltas)
 
     @property

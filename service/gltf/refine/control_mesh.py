@@ -87,7 +87,7 @@ class ControlMesh:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no face is left."""
+        """True where no face is left."""
         return self.cleaned_or_none is None
 
     @property

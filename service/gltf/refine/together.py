@@ -45,7 +45,7 @@ from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_nor
 
 @dataclass(frozen=True)
 class StageShares:
-    """Where the stages of a mesh begin, as shares of its work; writing is the rest."""
+    """Starts of the stages of a mesh, as shares of its work; writing is the rest."""
 
     weld: float
     refine: float

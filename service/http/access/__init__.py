@@ -1,1 +1,1 @@
-"""Who asks: the address behind a proxy, the name behind a key."""
+"""Identify clients: the address behind a proxy, the name behind a key."""

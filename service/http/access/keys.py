@@ -28,7 +28,7 @@ class KeysError(Exception):
 
 
 class Entry(BaseModel):
-    """What a file holds of one key: a name, a hash, and what its bearer may ask for."""
+    """Entry of one key in a file: a name, a hash, and what its bearer may ask for."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -87,7 +87,8 @@ def read_keys(path: Path) -> dict[str, Entry]:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         entries = _ENTRIES.validate_python(data.get("key", []))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise KeysError(f"{path}: {error}") from error
+        text = error.strerror if isinstance(error, OSError) else error
+        raise KeysError(f"PNS_KEYS_FILE: {path}: {text}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

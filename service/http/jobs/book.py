@@ -57,7 +57,7 @@ class Entry:
 
     @property
     def is_promised(self) -> bool:
-        """Whether its result must stay: nobody has fetched it, and its least time is not over."""
+        """True while its result must stay: not fetched yet, and its least time is not over."""
         return (
             self.job.state is State.DONE
             and not self.job.fetched.is_set()
@@ -87,12 +87,12 @@ class JobBook:
 
     @property
     def bytes(self) -> int:
-        """What the results take."""
+        """Bytes of all results."""
         return sum(entry.size or 0 for entry in self._ended.values())
 
     @property
     def tasks(self) -> list[asyncio.Task[None]]:
-        """What still works for a job in the book."""
+        """Tasks that work for a job in the book."""
         return [entry.task for entry in self._entries.values() if entry.task is not None]
 
     def check_room(self, networks: tuple[str, ...]) -> None:

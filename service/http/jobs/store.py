@@ -35,7 +35,7 @@ class StoreError(ServiceError):
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What the store knows of a job.
+    """A job in the store.
 
     Attributes:
         owner: whose it is; None for everybody who knows its id.
@@ -52,7 +52,7 @@ class Record:
 
 
 class Files(Protocol):
-    """Where bodies and results lie."""
+    """Place of bodies and results."""
 
     async def write(self, name: str, content: bytes, seconds: float) -> None:
         """Keep a file, for so many seconds at least."""

@@ -1,1 +1,1 @@
-"""What operators see: a line and a count for each request, metrics, traces."""
+"""Observation: a line and a count for each request, metrics, traces."""

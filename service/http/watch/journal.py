@@ -24,7 +24,7 @@ GONE = 499
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is known of a request that has ended.
+    """A request that has ended.
 
     Attributes:
         route: its pattern (`/jobs/{id}`), never what was in it; `none` where no route matched.

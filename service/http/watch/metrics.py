@@ -125,7 +125,7 @@ class _Tally(Collector):
 
 
 class _WorkerMemory(Collector):
-    """What the worker processes hold; the server's own is in `process_resident_memory_bytes`."""
+    """Memory of the worker processes; the server's own is in `process_resident_memory_bytes`."""
 
     def collect(self) -> Iterable[Metric]:
         family = GaugeMetricFamily(

@@ -1,1 +1,1 @@
-"""Where tasks are done: in processes of this machine, or on a Ray cluster."""
+"""Engines that do tasks: processes of this machine, or a Ray cluster."""

@@ -28,7 +28,7 @@ class Done(Generic[R]):
 
     @property
     def next_size(self) -> int:
-        """How many tasks like these fill a chunk."""
+        """Number of tasks like these that fill a chunk."""
         return max(1, min(MOST, int(len(self.results) * SECONDS / max(self.seconds, 1e-9))))
 
 

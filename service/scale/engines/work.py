@@ -1,4 +1,4 @@
-"""What is done with tasks, whoever does them.
+"""Work on tasks, for every engine.
 
 An engine takes tasks as they come and gives results as they end, in any order: those that came
 together in one list. It holds a bounded number of tasks at a time. A task whose process died or
@@ -34,7 +34,7 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Work(Generic[T, R]):
-    """What is done with each task.
+    """Work on each task.
 
     Attributes:
         job: done in a worker; what it raises is raised by the engine.

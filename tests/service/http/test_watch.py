@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 import socket
 import threading
 import urllib.request
@@ -19,7 +20,7 @@ from service.http.app import create_app
 from service.http.prompt_server import PromptServer
 from service.http.watch.metrics import Metrics
 from service.http.watch.scrapes import scrapes
-from service.log_lines import LONGEST, JsonLines
+from service.log_lines import LONGEST, JsonLines, TerminalLines
 from service.request_ids import REQUEST_ID
 from service.settings import Settings
 from service.workers.catalogue import Catalogue
@@ -121,6 +122,12 @@ def test_no_text_ends_its_line_or_speaks_to_a_terminal(message, value):
     line = JsonLines().format(record(message.replace("%", ""), value=value))
     assert all(" " <= character <= "~" for character in line)
     assert json.loads(line)["value"] == value[: len(value)]
+
+
+def test_a_terminal_is_shown_no_control_characters():
+    line = TerminalLines().format(record("in\x1b[2Jside\n", value="a\x7f\x9b\n"))
+    assert all(" " <= character <= "~" for character in line)
+    assert re.fullmatch(r"\d\d:\d\d:\d\dZ info: in.*side.* value=.*", line)
 
 
 def test_a_long_text_is_cut_in_its_middle():

@@ -33,7 +33,7 @@ SHARES = {"positions": 0.6, "base": 0.15, "columns": 0.15, "corners": 0.1}
 
 @dataclass(frozen=True)
 class Choice:
-    """What is asked for.
+    """Options of one refinement.
 
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
@@ -213,7 +213,7 @@ def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
 
 @dataclass(frozen=True, eq=False)
 class _Carry:
-    """What becomes of a layer: its values at the new points, edges, faces or corners."""
+    """Carry a layer's values to the new points, edges, faces or corners."""
 
     snapshot: Snapshot
     control: Control

@@ -1,4 +1,4 @@
-"""What corners carry, UV maps among it: smooth within a patch, and whole along its seams."""
+"""Refine values at corners, such as UV maps: smooth within a patch, and whole along its seams."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the edges of a refined mesh come from."""
+"""Match the edges of a refined mesh with those that they come from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is hidden: whatever is new inside a hidden face, and what is new on a hidden edge."""
+"""Hide the elements that are new inside a hidden face or on a hidden edge."""
 
 from __future__ import annotations
 

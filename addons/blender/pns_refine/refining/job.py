@@ -34,7 +34,7 @@ class Job(Generic[Answer]):
 
     @property
     def running(self) -> bool:
-        """Whether it is neither done nor stopped."""
+        """True until it is done or stopped."""
         return self._thread.is_alive()
 
     def cancel(self) -> None:

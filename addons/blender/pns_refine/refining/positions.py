@@ -1,4 +1,4 @@
-"""Where the vertices go: `pns_common.refine`, with creases that may wear off."""
+"""Positions of the vertices: `pns_common.refine`, with creases that may wear off."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is read of a mesh before it is refined, and what is made of it: arrays, and no Blender."""
+"""Arrays of a mesh before and after it is refined, without Blender."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pns_common import Mesh
 
 
 class Domain(Enum):
-    """What a layer's rows belong to."""
+    """Elements that a layer's rows belong to."""
 
     POINT = "POINT"
     EDGE = "EDGE"
@@ -23,7 +23,7 @@ class Domain(Enum):
 
 
 class Rule(Enum):
-    """How a new row comes of old ones."""
+    """Rule by which a new row comes of old ones."""
 
     # Weighted by the scheme's masks.
     BLEND = "blend"
@@ -93,7 +93,7 @@ class Snapshot:
 
     @cached_property
     def edge_used(self) -> Bool[np.ndarray, " E"]:
-        """Whether an edge belongs to a face."""
+        """True for edges that belong to a face."""
         sides = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=-1)
         return np.isin(edge_keys(self.edges), edge_keys(sides.reshape(-1, 2)))
 
@@ -143,7 +143,7 @@ class Faces:
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """What became of a snapshot: the same arrays at the new vertices, edges, faces and corners.
+    """A refined snapshot: the same arrays at the new vertices, edges, faces and corners.
 
     ``ratio`` and ``gate`` are the operator's diagnostics, ``distance`` is how far each vertex lies
     from where the base scheme alone would have it. ``normals`` are the surface's own, where they

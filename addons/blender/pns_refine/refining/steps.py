@@ -73,7 +73,7 @@ class Steps:
 
     @property
     def wears_off(self) -> bool:
-        """Whether some crease is not sharp for good."""
+        """True where some crease is not sharp for good."""
         first, last = self.steps[0], self.steps[-1]
         if any(step.mixture is not None or step.soft.named is not None for step in self.steps):
             return True

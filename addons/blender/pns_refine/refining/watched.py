@@ -22,12 +22,12 @@ class WatchedModel:
 
     @property
     def card(self) -> ModelCard:
-        """What the model says of itself."""
+        """The model's card."""
         return self.model.card
 
     @property
     def name(self) -> str:
-        """How reports call it."""
+        """Name in reports."""
         return self.model.name
 
     @property

@@ -1,0 +1,45 @@
+"""Compile or load the kernels that files need, beside those of pns_common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from pns_common import load_model
+from pns_common import warm_up as warm_up_library
+from pns_common.warming import CLOSED, VERTICES
+
+from .gltf.subdivide import subdivide_gltf
+from .meshfiles.mesh_file import COLOUR, Layer, of_triangles
+from .meshfiles.triangles_glb import triangles_glb
+from .options import Limits, Options
+
+
+def warm_up(announce: Callable[[str], None]) -> None:
+    """Run every kernel once, so that no job waits for a compiler; `announce` as in pns_common."""
+    warm_up_library(announce)
+    file, model = _rigged(), load_model()
+    for options in (
+        Options(),
+        Options(levels=1, limit=True, normals="limit", uv="smooth", weld_tolerance=0.001),
+    ):
+        subdivide_gltf(file, "glb", options, model, Limits())
+
+
+def _rigged() -> bytes:
+    """Return a tetrahedron with all attributes that have kernels of their own, as a GLB."""
+    mesh = of_triangles(VERTICES, np.array(CLOSED), VERTICES[:, :2], VERTICES - VERTICES.mean(0))
+    count = len(VERTICES)
+    joints = np.tile(np.arange(4, dtype=np.uint8), (count, 1))
+    weights = np.full((count, 4), 0.25, np.float32)
+    tangents = np.tile(np.array([1, 0, 0, 1], np.float32), (count, 1))
+    values = {
+        "TANGENT": tangents,
+        COLOUR: np.full((count, 4), 255, np.uint8),
+        "JOINTS_0": joints,
+        "WEIGHTS_0": weights,
+    }
+    layers = {name: Layer(value, mesh.corners) for name, value in values.items()}
+    return triangles_glb(replace(mesh, layers={**mesh.layers, **layers}))
