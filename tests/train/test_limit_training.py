@@ -144,7 +144,7 @@ def test_batches_made_ahead_are_those_made_here(no_solids, monkeypatch):
     monkeypatch.setattr(limit_trainer, "ahead", lambda make, *arguments: make(*arguments))
     drawn = list(limit_trainer._draws(recipe, plan))
     assert [len(draw.places) for draw in drawn] == [2, 2, 2, 1]
-    given = [batch for batch, _ in limit_trainer._batches(recipe, plan)]
+    given = [batch for batch, _ in limit_trainer.batches(recipe, plan)]
     kept = [[0], [0, 1], [1, 2], [2, 3]]
     expected = [drawn[kept[n][place]] for n, draw in enumerate(drawn) for place in draw.places]
     for batch, draw in zip(given, expected, strict=True):

@@ -76,9 +76,7 @@ def test_coarse_faces_look_the_way_the_surface_does(kind):
         np.testing.assert_allclose(np.linalg.norm(pair.surface.normals, axis=1), 1, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "kind", [solid_pairs, sphere_pair, faceted_pair, machined_pairs, lathe_pair]
-)
+@pytest.mark.parametrize("kind", CLOSED)
 def test_solids_are_closed(kind):
     for pair in drawn(kind):
         assert connect(pair.coarse.faces, len(pair.coarse.vertices)).paired.all()

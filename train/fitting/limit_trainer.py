@@ -43,7 +43,7 @@ def fit_to_limit(
             optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP
         )
         losses: list[float] = []
-        for batch, reference in _batches(recipe, plan):
+        for batch, reference in batches(recipe, plan):
             logits = batch.level.logits(networks.sharp)
             loss = plan.weights.sharp * sharpness_loss(batch, logits)
             if len(losses) >= plan.start:
@@ -75,7 +75,7 @@ def reference_of(batch: LimitBatch) -> LimitMeasures:
         return measure(batch, batch.level.second(smooth, batch.level.first(smooth, None)))
 
 
-def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
+def batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     """Yield one batch a step, drawn from a pool that grows until its oldest give way to new ones.
 
     Making a batch takes as long as some ten steps on it, so another process makes the next one.

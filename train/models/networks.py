@@ -43,7 +43,7 @@ class BoundedNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, 3), activation, generator)
+        self.net = perceptron((feature_count, *hidden, 3), activation, generator)
 
     def forward(
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
@@ -74,7 +74,7 @@ class SharpNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, 1), activation, generator)
+        self.net = perceptron((feature_count, *hidden, 1), activation, generator)
 
     def forward(self, features: Float[Tensor, "N K"]) -> Float[Tensor, "N 1"]:
         """Return the answer before the sigmoid."""
@@ -141,9 +141,10 @@ def _single(values: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
     return torch.from_numpy(values.astype(np.float32))
 
 
-def _perceptron(
+def perceptron(
     widths: tuple[int, ...], activation: str, generator: torch.Generator
 ) -> nn.Sequential:
+    """Return linear layers from each width to the next, and activations between them."""
     layers: list[nn.Module] = []
     for fan_in, fan_out in pairwise(widths):
         layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]

@@ -20,6 +20,7 @@ from pns_common.model.card import ModelCard
 from pns_common.model.session import Model
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.controls import flat, n1
+from train.baselines.neural_subdivision import neural_subdivision
 from train.baselines.pn_triangles import pn_triangles
 from train.connectivity import connect
 from train.data.pairs.references import Pair, Reference
@@ -51,7 +52,8 @@ NOTE = (
     "how far the largest angle between neighbouring faces exceeds the dense mesh's own, mean in "
     "degrees. *Crossing* is the number of faces that pass through others, over the larger of "
     "Loop's and the control mesh's, summed. *Precision* and *recall* are of the coarse edges that "
-    "are sharp in truth, on parts and buildings."
+    "are sharp in truth, on parts and buildings. *Neural Subdivision* has the form of Liu et al. "
+    "2020, trained on the default model's stream."
 )
 
 
@@ -111,6 +113,7 @@ def contenders(model: Model) -> dict[str, Contender]:
         ),
         "Butterfly": Contender(modified_butterfly()),
         "N1": Contender(n1()),
+        "Neural Subdivision": Contender(neural_subdivision()),
         ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
         OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
     }
