@@ -74,7 +74,6 @@ ORDER = (
     "faces",
     "pool",
     "reuse",
-    "trained_strength",
     "start",
     "learning_rate",
     "final_learning_rate",

@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from pns_common import Mesh, loop
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups, three_pages
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
-from train.baselines.controls import flat, n1, nc, q1
-from train.baselines.curvature_adaptive import curvature_adaptive
+from train.baselines.controls import flat, full_push, n1, nc, q1
+from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
 from train.baselines.neural_subdivision import HalfFlapNets, neural_subdivision
-from train.baselines.normal_displacement import fit_scalar, normal_displacement
 from train.baselines.pn_triangles import cubic_control_point, pn_triangles
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 from train.connectivity import connect
@@ -20,7 +19,6 @@ from train.data.primitives import box, globe, icosphere, torus
 from train.metrics.card import one_step_table
 from train.refining import refine
 from train.surfaces.implicit import SphereRidge
-from train.surfaces.quasi_interpolation import full_push
 
 BASELINES = {
     "butterfly": modified_butterfly(),

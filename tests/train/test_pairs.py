@@ -16,7 +16,7 @@ from train.connectivity import connect
 from train.data.pairs import references as subject
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
-from train.data.pairs.lathe import lathe_pair, turned
+from train.data.pairs.lathe import PLANS, centred, ears, lathe_pair, polygon, raised, random_lid
 from train.data.pairs.machined import machined_pairs
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.polygons import in_polygons, is_manifold, polygon_stream, remeshed
@@ -79,24 +79,45 @@ def test_coarse_faces_look_the_way_the_surface_does(kind):
         np.testing.assert_allclose(np.linalg.norm(pair.surface.normals, axis=1), 1, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "kind", [solid_pairs, sphere_pair, faceted_pair, machined_pairs, lathe_pair]
-)
+@pytest.mark.parametrize("kind", CLOSED)
 def test_solids_are_closed(kind):
     for pair in drawn(kind):
         assert connect(pair.coarse.faces, len(pair.coarse.vertices)).paired.all()
 
 
-def test_a_turned_outline_is_the_prism_or_cone_that_it_draws():
-    """Volumes of n-gons' prisms and pyramids, lids with and without a vertex in the middle."""
+def test_an_outline_round_a_polygon_is_the_prism_or_pyramid_that_it_draws():
+    """Volumes, however quads and lids are cut; lids with and without a vertex in the middle."""
+    rng = np.random.default_rng(0)
     for sides in (3, 8, 17):
-        area = sides * np.sin(2 * np.pi / sides) / 2
-        for centres in ((True, True), (False, True), (False, False)):
-            prism = turned(np.array([[1.0, 0], [1, 3]]), sides, np.array(centres))
-            cone = turned(np.array([[1.0, 0], [0, 3]]), sides, np.array([centres[0], True]))
+        plan, area = polygon(sides), sides * np.sin(2 * np.pi / sides) / 2
+        middle, corners = centred(sides), ears(plan)
+        for lids, inner in (((middle, middle), 2), ((corners, middle), 1), ((corners,) * 2, 0)):
+            other_way = rng.random(sides) < 0.5
+            prism = raised(np.array([[1.0, 0], [1, 3]]), plan, lids, other_way)
+            pyramid = raised(np.array([[1.0, 0], [0, 3]]), plan, lids)
             assert volume(prism) == pytest.approx(3 * area)
-            assert volume(cone) == pytest.approx(area)
-            assert len(prism.faces) == 4 * sides - 2 * (2 - sum(centres))
+            assert volume(pyramid) == pytest.approx(area)
+            assert len(prism.faces) == 4 * sides - 2 * (2 - inner)
+
+
+def area(plan, triangles):
+    """Of each triangle, negative where it is clockwise."""
+    a, b, c = (np.append(plan, [[0.0, 0.0]], axis=0)[triangles[:, k]] for k in range(3))
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return (ux * vy - uy * vx) / 2
+
+
+@pytest.mark.parametrize("draw", PLANS)
+def test_a_plan_is_anticlockwise_and_every_lid_covers_it_once(draw):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        for plan in draw(rng):
+            x, y = plan.T
+            whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+            assert whole > 0
+            triangles = area(plan, random_lid(plan, rng))
+            assert triangles.min() > -1e-12
+            assert triangles.sum() == pytest.approx(whole)
 
 
 def test_the_stream_depends_on_its_seed_alone():

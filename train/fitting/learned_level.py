@@ -9,7 +9,7 @@ gradients pass through z and w, with the order of weights around vertices and s 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
@@ -128,12 +128,15 @@ class LearnedLevel:
         if networks is None:
             return base
         delta = self.displacement(sharp, networks)
+        # Where another edge is a little sharp, the boundary places no vertex alone.
+        shared = self.curves.shared.copy()
+        shared[: len(self.points)] &= sharp.third.detach().numpy() == 0
         scale = operator.guard_scale(
             self.level,
             base.detach().numpy(),
             delta.detach().numpy(),
             self.numbers["fold_angle"],
-            self.curves,
+            replace(self.curves, shared=shared),
         )
         return base + torch.from_numpy(scale)[:, None] * delta
 
@@ -183,7 +186,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
     Raises:
         ParameterError: the recipe is not scale-free.
     """
-    form, vertex_rule, strength = scale_free_parts(recipe)
+    form, vertex_rule = scale_free_parts(recipe)
     rule = operator.Rule(
         edge_network=_not_asked,
         feature_count=18,
@@ -235,7 +238,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         push=torch.from_numpy(operator.pushes(level, unit_prior)),
         numbers={
             "budget": recipe.budget,
-            "strength": strength,
+            "strength": form.prior_strength,
             "curve": form.boundary_strength,
             "vertex_gate": vertex_rule.gate_sharpness,
             "fold_angle": math.radians(form.fold_angle),

@@ -40,6 +40,7 @@ class LimitBatch:
         owner: the mesh that each belongs to.
         area: each face's share of its mesh's area, summing to 1 a mesh.
         sharp: which interior edges are sharp in truth.
+        edge_owner, edge_share: the mesh of each, and its share of all their turns there.
         tree: of all surfaces' points.
         points, normals: of all surfaces.
         back: the surfaces' points from which the limit is looked at.
@@ -53,6 +54,8 @@ class LimitBatch:
     owner: Int[np.ndarray, " F"]
     area: Float[Tensor, " F"]
     sharp: Float[Tensor, " I"]
+    edge_owner: Int[np.ndarray, " I"]
+    edge_share: Float[Tensor, " I"]
     tree: KDTree
     points: Float[np.ndarray, "S 3"]
     normals: Float[np.ndarray, "S 3"]
@@ -94,7 +97,12 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
     normals = _joined(pair.surface.normals for pair in pairs)
     from_mesh = np.repeat(np.arange(len(pairs)), [len(pair.surface.points) for pair in pairs])
     back = np.sort(rng.choice(len(surface), min(SEEN_BACK, len(surface)), replace=False))
-    sharp = _joined(coarse_sharp_edges(pair) for pair in pairs)[level.interior.numpy()]
+    marks = [coarse_sharp_edges(pair) for pair in pairs]
+    edge_owner = np.repeat(np.arange(len(pairs)), [len(edges) for edges in marks])
+    interior = level.interior.numpy()
+    edge_owner, sharp = edge_owner[interior], _joined(marks)[interior]
+    turn = level.psi[:, 0].numpy()
+    edge_share = turn / np.maximum(np.bincount(edge_owner, turn), 1e-300)[edge_owner]
     return LimitBatch(
         count=len(pairs),
         level=level,
@@ -103,6 +111,8 @@ def limit_batch(pairs: Sequence[Pair], recipe: Recipe, rng: np.random.Generator)
         owner=owner,
         area=torch.from_numpy(area / np.maximum(np.bincount(owner, area), 1e-300)[owner]),
         sharp=torch.from_numpy(sharp).double(),
+        edge_owner=edge_owner,
+        edge_share=torch.from_numpy(edge_share),
         tree=KDTree(surface),
         points=surface,
         normals=normals,

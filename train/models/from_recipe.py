@@ -159,14 +159,14 @@ def general_rule(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """
-    form, vertex_rule, strength = scale_free_parts(recipe)
+    form, vertex_rule = scale_free_parts(recipe)
     return GeneralRule(
         unit_correction(network),
         unit_correction(vertex_network),
         recipe.budget,
         recipe.gate_sharpness,
         vertex_rule.gate_sharpness,
-        strength,
+        form.prior_strength,
         form.boundary_strength,
         form.network_scale,
         form.fold_angle,

@@ -47,9 +47,9 @@ def machined_pairs(rng: np.random.Generator, coarsen: Coarsen = coarsened) -> It
     coarse = Mesh(drawn.vertices @ turn, drawn.faces)
     if len(coarse.faces) <= MOST and is_manifold(coarse):
         yield Pair("machined", coarse, surface, sharp)
-    for _ in range(EACH):
-        most = min(MOST, len(dense.faces) // 2)
-        count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(max(most, FEWEST + 1)))))
+    most = min(MOST, len(dense.faces) // 2)
+    for _ in range(EACH if most > FEWEST else 0):
+        count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(most))))
         coarse = coarsen(dense.vertices @ turn, dense.faces, count, rng)
         if coarse is not None:
             yield Pair("machined", coarse, surface, sharp)

@@ -1,7 +1,7 @@
 """An endless, seeded stream of coarse meshes with their surfaces, for training to limit surfaces.
 
 Closed solids of every size first, then open patches on analytic surfaces, grids of quads, spheres,
-solids of plane faces, turned parts, and machined ones.
+solids of plane faces, parts drawn with few faces, and machined ones.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,15 +23,15 @@ Several = Callable[[np.random.Generator], Iterator[Pair]]
 # How often each draws a pair, in the order that a seed means.
 SHARES: Mapping[Single, float] = MappingProxyType(
     {
-        patch_pair: 0.05,
-        grid_pair: 0.10,
-        sphere_pair: 0.05,
-        faceted_pair: 0.08,
-        lathe_pair: 0.10,
+        patch_pair: 0.12,
+        grid_pair: 0.05,
+        sphere_pair: 0.04,
+        faceted_pair: 0.05,
+        lathe_pair: 0.26,
     }
 )
 # Makers of several pairs of one shape, which are drawn one by one.
-SHARED: Mapping[Several, float] = MappingProxyType({machined_pairs: 0.22, solid_pairs: 0.40})
+SHARED: Mapping[Several, float] = MappingProxyType({machined_pairs: 0.14, solid_pairs: 0.34})
 
 MOST_FACES = 1200
 
