@@ -161,7 +161,8 @@ def test_a_stream_of_polygons_depends_on_its_seed_alone():
 
 
 def test_triangles_of_a_drum_are_joined_to_its_quads_and_lids():
-    drum = turned(np.array([[1.0, 0], [1, 2]]), 12, np.array([False, False]))
+    plan = polygon(12)
+    drum = raised(np.array([[1.0, 0], [1, 2]]), plan, (ears(plan), ears(plan)))
     seen = set()
     for seed in range(8):
         made = in_polygons(drum, np.random.default_rng(seed))
