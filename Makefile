@@ -91,12 +91,13 @@ fuzz: $(DEV)/.ready
 
 # Train and export the bundled models again; the same machine gives the same bytes. MODELS=paper
 # takes half a minute; general takes some minutes.
-MODELS ?= paper signed general
+MODELS ?= paper signed general general-quad
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
 	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
+	$(DEV)/bin/python export/run.py --prior-alone
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
 SOAK ?= --minutes 10

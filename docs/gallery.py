@@ -104,7 +104,7 @@ def draw(
     base: Float[np.ndarray, "F 3"],
     line_width: float,
 ) -> None:
-    """Draw faces towards the eye, far ones first, in flat shading."""
+    """Draw faces towards the eye, far ones first, in flat shading with highlights."""
     forward = VIEW / np.linalg.norm(VIEW)
     right = np.cross([0.0, 0.0, 1.0], forward)
     right /= np.linalg.norm(right)
@@ -118,7 +118,10 @@ def draw(
     order = seen[np.argsort((corners[seen].mean(axis=1)) @ forward)]
     light = np.array([LIGHT[0], -LIGHT[2], LIGHT[1]]) / np.linalg.norm(LIGHT)
     brightness = 0.45 + 0.6 * np.clip(normals[order] @ light, 0, 1)
-    shade = np.clip(base[order] * brightness[:, None], 0, 1)
+    # A highlight shows dents and bumps that flat colours hide.
+    halfway = (light + forward) / np.linalg.norm(light + forward)
+    shine = 0.5 * np.clip(normals[order] @ halfway, 0, 1) ** 60
+    shade = np.clip(base[order] * brightness[:, None] + shine[:, None], 0, 1)
     outline = "#20242a" if line_width else shade
     flat = np.stack([corners[order] @ right, corners[order] @ up], axis=-1)
     # Faces without an outline get one of their own colour, which hides the seams between them.

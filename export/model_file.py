@@ -38,6 +38,7 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
         path,
         vertex_network=checkpoint.vertex_network,
         sharpness_network=checkpoint.sharpness_network,
+        face_network=checkpoint.face_network,
     )
 
 
@@ -48,11 +49,12 @@ def write_model(
     tolerance: float = TOLERANCE,
     vertex_network: BoundedNet | None = None,
     sharpness_network: SharpNet | None = None,
+    face_network: BoundedNet | None = None,
 ) -> Exported:
     """Write networks under a card, in one piece; raises as `export_model` does."""
-    data = model_bytes(network, card, vertex_network, sharpness_network)
+    data = model_bytes(network, card, vertex_network, sharpness_network, face_network)
     model = model_from_bytes(data, name=path.stem)
-    parity = check_parity(model, network, tolerance, vertex_network)
+    parity = check_parity(model, network, tolerance, vertex_network, face_network)
     if sharpness_network is not None:
         check_sharpness(model, sharpness_network, tolerance)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +74,6 @@ ORDER = (
     "faces",
     "pool",
     "reuse",
-    "trained_strength",
     "start",
     "learning_rate",
     "final_learning_rate",
@@ -80,6 +81,7 @@ ORDER = (
     "quiet",
     "vertex",
     "sharpness",
+    "face",
     "machine",
 )
 
@@ -97,8 +99,9 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     if vertex is not None:
         on_card["vertex_features"] = recipe["vertex"].pop("features")
         on_card["vertex_gate_sharpness"] = recipe["vertex"].pop("gate_sharpness")
-    if checkpoint.recipe.sharpness is not None:
-        on_card["sharpness_features"] = recipe["sharpness"].pop("features")
+    for name in ("sharpness", "face"):
+        if recipe[name] is not None:
+            on_card[f"{name}_features"] = recipe[name].pop("features")
     if form is not None:
         on_card |= recipe.pop("scale_free")
     # One level of names: how it was trained stands beside the rest.

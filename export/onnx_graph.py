@@ -22,11 +22,13 @@ def model_bytes(
     card: ModelCard,
     vertex_network: BoundedNet | None = None,
     sharpness_network: SharpNet | None = None,
+    face_network: BoundedNet | None = None,
 ) -> bytes:
     """Return the model file: features [edges, K] and budget in, corrections [edges, 3] out.
 
     With a vertex network also vertex_features [vertices, L] in and vertex_correction out; with a
-    sharpness network sharpness_features [edges, P] in, and its sigmoid out, sharpness [edges, 1].
+    face network face_features [faces, M] in and face_correction [faces, 1] out; with a sharpness
+    network sharpness_features [edges, P] in, and its sigmoid out, sharpness [edges, 1].
     The projection onto the ball is inside, so ‖correction‖ ≤ budget whatever the weights are.
     Only long-standing standard operators: GELU and SiLU are spelt out. Tied weights are written
     as the dense matrices that they make.
@@ -39,6 +41,11 @@ def model_bytes(
         _add_network(graph, vertex_network, "vertex_features", "vertex_correction")
         inputs.append(_rows("vertex_features", "vertices", vertex_network))
         outputs.append(_answers("vertex_correction", "vertices"))
+    if face_network is not None:
+        graph.prefix = "face_"
+        _add_network(graph, face_network, "face_features", "face_correction")
+        inputs.append(_rows("face_features", "faces", face_network))
+        outputs.append(_answers("face_correction", "faces", 1))
     if sharpness_network is not None:
         graph.prefix = "sharpness_"
         answer = _perceptron(graph, sharpness_network, "sharpness_features")
@@ -80,7 +87,8 @@ class _Graph:
 
 def _add_network(graph: _Graph, network: BoundedNet, features: str, output: str) -> None:
     perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
-    _project_onto_ball(graph, perceptron(graph, network, features), output)
+    columns = network.linear_layers[-1].out_features
+    _project_onto_ball(graph, perceptron(graph, network, features), output, columns)
 
 
 def _perceptron(graph: _Graph, network: BoundedNet | SharpNet, value: str) -> str:
@@ -152,14 +160,14 @@ def _tanh(graph: _Graph, x: str) -> str:
 _ACTIVATIONS = {"gelu": _gelu, "silu": _silu, "tanh": _tanh}
 
 
-def _project_onto_ball(graph: _Graph, z: str, output: str) -> None:
+def _project_onto_ball(graph: _Graph, z: str, output: str, columns: int) -> None:
     """Add budget · z / √max(1, ‖z‖²).
 
-    A product with ones puts ‖z‖² into all three columns: onnxruntime divides equal shapes several
+    A product with ones puts ‖z‖² into all columns: onnxruntime divides equal shapes several
     times as fast as it spreads one column over three.
     """
     square = graph.apply("Mul", z, z)
-    square = graph.apply("MatMul", square, graph.constant("ones", np.ones((3, 3))))
+    square = graph.apply("MatMul", square, graph.constant("ones", np.ones((columns, columns))))
     divisor = graph.apply("Sqrt", graph.apply("Max", square, graph.constant("one", 1.0)))
     graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output=output)
 

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import ModelError, PnsError
-from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, Feature
+from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS, Feature
 from pns_common.model.session import OnnxModel
 from train.models.networks import BoundedNet, SharpNet
 
@@ -54,6 +54,7 @@ def check_parity(
     network: BoundedNet,
     tolerance: float = TOLERANCE,
     vertex_network: BoundedNet | None = None,
+    face_network: BoundedNet | None = None,
 ) -> Parity:
     """Compare the file, run by onnxruntime in float32, with the torch network in float64.
 
@@ -70,12 +71,14 @@ def check_parity(
             found=f"vertex features {model.card.vertex_features}",
         )
     seen = FEATURE_SETS[model.card.features].features
-    edges = _compare(model, network, seen, tolerance)
-    if vertex_network is None or model.card.vertex_features is None:
-        return edges
-    seen = RING_FEATURE_SETS[model.card.vertex_features].features
-    vertices = _compare(model.vertex_correction, vertex_network, seen, tolerance)
-    return Parity(max(edges.difference, vertices.difference), max(edges.length, vertices.length))
+    made = [_compare(model, network, seen, tolerance)]
+    if vertex_network is not None and model.card.vertex_features is not None:
+        seen = RING_FEATURE_SETS[model.card.vertex_features].features
+        made.append(_compare(model.vertex_correction, vertex_network, seen, tolerance))
+    if face_network is not None and model.card.face_features is not None:
+        seen = FACE_FEATURE_SETS[model.card.face_features].features
+        made.append(_compare(model.face_correction, face_network, seen, tolerance))
+    return Parity(max(each.difference for each in made), max(each.length for each in made))
 
 
 def check_sharpness(model: OnnxModel, network: SharpNet, tolerance: float = TOLERANCE) -> None:

@@ -2,8 +2,7 @@
 
 With `--install` it writes the bundled model of the recipe instead, which is tracked. With
 `--published DIR` it writes a model file for each of the author's PNS networks. With `--measure
-NAME` it measures a bundled model anew, which a change of the operator asks for. With
-`--prior-alone` it writes the untrained model for polygons.
+NAME` it measures a bundled model anew, which a change of the operator asks for.
 """
 
 import sys
@@ -19,10 +18,9 @@ from rich.markup import escape
 
 from export.measure import measure_anew
 from export.model_file import Exported, export_model
-from export.prior_alone import write_prior_alone
 from export.published import export_published
 from pns_common.errors import ParameterError, PnsError
-from pns_common.model.file import COMPANIONS, DEFAULT_MODEL, write_manifest
+from pns_common.model.file import write_manifest
 from train.models.checkpoint import load_checkpoint
 from train.models.recipe import Recipe
 from train.models.recipes import RECIPES
@@ -33,6 +31,7 @@ FILE_OF_RECIPE = {
     "paper": MODELS / "paper.onnx",
     "signed": MODELS / "signed.onnx",
     "general": MODELS / "general.onnx",
+    "general-quad": MODELS / "general-quad.onnx",
 }
 
 
@@ -65,9 +64,6 @@ def main(
     install: Annotated[
         bool, typer.Option("--install", help="Replace the bundled model of the recipe.")
     ] = False,
-    prior_alone: Annotated[
-        bool, typer.Option("--prior-alone", help="Write the untrained companion for polygons.")
-    ] = False,
     measure: Annotated[
         str | None, typer.Option(help="Bundled model whose card to write with new metrics.")
     ] = None,
@@ -78,10 +74,6 @@ def main(
     try:
         if measure is not None:
             measure_anew(MODELS / f"{measure}.onnx", lambda name: console.print(f"measured {name}"))
-            write_manifest(MODELS)
-        elif prior_alone:
-            sha256 = write_prior_alone(output or MODELS / f"{COMPANIONS[DEFAULT_MODEL]}.onnx")
-            console.print(f"written, sha256 {sha256}")
             write_manifest(MODELS)
         elif published is not None:
             written = export_published(published, output or PUBLISHED_MODELS)

@@ -98,7 +98,8 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
 
 
 def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
-    network, others = trained.network, (trained.vertex_network, trained.sharpness_network)
+    network = trained.network
+    others = trained.vertex_network, trained.sharpness_network, trained.face_network
     scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
     improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}

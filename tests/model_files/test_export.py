@@ -16,21 +16,21 @@ import export.run
 from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity, check_sharpness
-from export.prior_alone import write_prior_alone
 from pns_common import ModelError
-from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS
+from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
 from tests.support.networks import CARD, DEFAULT_CARD
 from train.metrics.card import TO_LIMIT
 from train.metrics.one_step import Improvement
-from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.from_recipe import (
     initial_network,
+    initial_networks,
     initial_sharpness_network,
     initial_vertex_network,
 )
 from train.models.networks import BoundedNet, SharpNet
-from train.models.recipes import general, paper
+from train.models.recipes import general, general_quad, paper
 from train.models.tied import TiedNet
 
 EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_FEATURE_SETS["ring-10"].symmetries
@@ -245,17 +245,34 @@ def test_a_bundled_model_is_measured_anew_and_keeps_its_networks(tmp_path, monke
     assert "expected a model file" in refused.output
 
 
-def test_the_prior_alone_answers_zero_and_says_that_it_is_untrained(tmp_path):
-    path = tmp_path / "prior.onnx"
-    digest = write_prior_alone(path)
-    model = load_model(path)
-    assert model.hash == digest == write_prior_alone(tmp_path / "again.onnx")
-    assert "untrained" in model.card.training["recipe"]
-    for answers, columns in (
-        (model, 18),
-        (model.vertex_correction, 10),
-        (model.face_correction, 8),
-    ):
-        assert not answers(np.ones((5, columns)), 3.0).any()
+def test_a_file_for_polygons_says_what_its_four_networks_say(tmp_path):
+    recipe = general_quad()
+    networks = initial_networks(recipe)
+    assert networks.face is not None
+    last = networks.face.linear_layers[-1]
+    with torch.no_grad():
+        weight = torch.randn(last.weight.shape, generator=torch.Generator().manual_seed(0))
+        last.weight = weight / 8
+    path, saved = tmp_path / "quads.onnx", tmp_path / "quads.safetensors"
+    parts = networks.vertex, networks.sharp, networks.face
+    save_checkpoint(saved, Checkpoint(recipe, networks.edge, {}, "a", *parts))
+    export_model(load_checkpoint(saved), path)
+    model, rows = load_model(path), np.random.default_rng(0).uniform(-1, 1, (500, 8))
+    with torch.no_grad():
+        expected = networks.face(torch.from_numpy(rows).float(), 3.0).numpy()
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(model.face_correction(rows, 3.0), expected, atol=3 * SINGLE)
+    # Turned over, a face's normal changes its sign.
+    group = FACE_FEATURE_SETS["face-8"].symmetries
+    turned = model.face_correction(rows[:, group.order[1]] * group.signs[1], 3.0)
+    np.testing.assert_allclose(turned, -expected, atol=3 * SINGLE)
+    # Sharpness is the default model's.
     asked = np.random.default_rng(0).standard_normal((50, 53))
-    np.testing.assert_array_equal(model.sharpness(asked), load_model().sharpness(asked))
+    np.testing.assert_allclose(model.sharpness(asked), load_model().sharpness(asked), atol=1e-6)
+    assert not any(weight.requires_grad for weight in networks.sharp.parameters())
+
+
+def test_the_bundled_models_find_the_same_edges_sharp():
+    asked = np.random.default_rng(0).standard_normal((50, 53))
+    answers = [load_model(name).sharpness(asked) for name in ("general", "general-quad")]
+    np.testing.assert_array_equal(*answers)

@@ -20,7 +20,7 @@ from statistics import median
 from tests.support.proxy import proxied
 
 ROOT = Path(__file__).resolve().parents[2]
-PROPORTIONAL = re.compile(r"^Pss: +(\d+) kB$", re.MULTILINE)
+PROPORTIONAL = re.compile(r"^Pss_(?:Anon|Shmem): +(\d+) kB$", re.MULTILINE)
 # Results are not kept for a quarter of an hour: they would still be there at the end.
 SETTINGS = {"PNS_WORKERS": "2", "PNS_RESULT_SECONDS": "5", "PNS_PROXIES": "127.0.0.1"}
 # The honest clients have one address together.
@@ -103,9 +103,9 @@ def _children(pid: int) -> Iterator[int]:
 
 
 def _proportional(pid: int) -> int:
-    """KiB of memory; of what processes share, each has its part."""
+    """KiB of memory, shared pages by parts. A part of a library's file grows as others end."""
     try:
-        return int(PROPORTIONAL.findall(Path(f"/proc/{pid}/smaps_rollup").read_text())[0])
-    except (OSError, IndexError):
+        return sum(map(int, PROPORTIONAL.findall(Path(f"/proc/{pid}/smaps_rollup").read_text())))
+    except OSError:
         # It has ended meanwhile.
         return 0

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from pns_common import Mesh, loop
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, rotation, soups, three_pages
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
-from train.baselines.controls import flat, n1, nc, q1
-from train.baselines.curvature_adaptive import curvature_adaptive
-from train.baselines.normal_displacement import fit_scalar, normal_displacement
+from train.baselines.controls import flat, full_push, n1, nc, q1
+from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
+from train.baselines.neural_subdivision import HalfFlapNets, neural_subdivision
 from train.baselines.pn_triangles import cubic_control_point, pn_triangles
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 from train.connectivity import connect
@@ -19,7 +19,6 @@ from train.data.primitives import box, globe, icosphere, torus
 from train.metrics.card import one_step_table
 from train.refining import refine
 from train.surfaces.implicit import SphereRidge
-from train.surfaces.quasi_interpolation import full_push
 
 BASELINES = {
     "butterfly": modified_butterfly(),
@@ -28,6 +27,12 @@ BASELINES = {
     "normal-displacement": normal_displacement(0.05),
     "curvature-adaptive": curvature_adaptive(10.0),
 }
+# Its trained networks, and others.
+HALF_FLAPS = {
+    "neural-subdivision": neural_subdivision(),
+    "neural-subdivision, untrained": neural_subdivision(HalfFlapNets(torch.Generator())),
+}
+BASELINES |= HALF_FLAPS
 INTERPOLATING = ("butterfly", "pn-triangles", "quadric")
 SHAPES = {"torus": torus(7, 5), "globe": globe(9, 4), "box": box(1, 2, 3)}
 each_baseline = pytest.mark.parametrize("name", BASELINES)
@@ -52,7 +57,7 @@ def test_baselines_commute_with_rigid_motion(name, mesh):
     np.testing.assert_allclose(there, here @ turn.T + shift, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", sorted(set(BASELINES) - {"normal-displacement"}))
+@pytest.mark.parametrize("name", sorted(set(BASELINES) - {"normal-displacement", *HALF_FLAPS}))
 def test_planar_input_stays_in_its_plane(name):
     refined = refine(Mesh(*grid(6)), BASELINES[name], levels=3).mesh
     np.testing.assert_allclose(refined.vertices[:, 2], 0, atol=1e-14)
@@ -68,13 +73,29 @@ def test_irregular_edges_take_the_midpoint(name):
     np.testing.assert_allclose(refined[len(vertices) + edge], middle)
 
 
-@each_baseline
+@pytest.mark.parametrize("name", sorted(set(BASELINES) - set(HALF_FLAPS)))
 def test_old_vertices_stay_or_move_as_loop_moves_them(name):
     mesh = Mesh(*grid(6, bent))
     count = len(mesh.vertices)
     expected = mesh if name in INTERPOLATING else refine(mesh, loop()).mesh
     moved = refine(mesh, BASELINES[name]).mesh.vertices[:count]
     np.testing.assert_allclose(moved, expected.vertices[:count], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", HALF_FLAPS)
+def test_half_flaps_know_no_size_and_leave_boundaries_alone(name):
+    mesh = Mesh(*grid(6, bent))
+    small, large = (
+        refine(Mesh(scale * mesh.vertices, mesh.faces), BASELINES[name]).mesh.vertices
+        for scale in (1.0, 1024.0)
+    )
+    np.testing.assert_allclose(large, 1024 * small, rtol=1e-5, atol=1e-3)
+    level = connect(mesh.faces, len(mesh.vertices))
+    edges = level.boundary.numpy()
+    middles = mesh.vertices[level.edges[level.boundary]].mean(axis=1)
+    np.testing.assert_array_equal(small[len(mesh.vertices) :][edges], middles)
+    moved = np.linalg.norm(small[: len(mesh.vertices)] - mesh.vertices, axis=1)
+    assert ((moved > 0) == level.ringed.numpy()).all()
 
 
 def test_the_ratio_is_the_distance_from_loop_in_envelopes_of_half_a_curvature():

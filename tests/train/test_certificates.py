@@ -11,7 +11,6 @@ from tests.support import schemes
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, one_way_pair, three_pages
 from tests.support.networks import default_model, huge_model, random_model
 from tests.support.shared import shared_path
-from train.ablations.variants import VARIANTS, variant_recipe
 from train.certificates.affine import affine_reproduction
 from train.certificates.bodies import (
     Body,
@@ -48,6 +47,7 @@ from train.certificates.subject import (
     subject_of_network,
     worst,
 )
+from train.experiments.harness.variants import VARIANTS, variant_recipe
 from train.experiments.paper.structural import scaled, variant_subject
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet

@@ -13,8 +13,8 @@ pytestmark = pytest.mark.usefixtures("small_figures")
 
 NAMES = (
     "structural, spectral, ablation, headline, cross-section, repeated, c-sweep, budget, capacity, "
-    "saddle, sphere-ridge, features, extended, lifted-stars, cad, models, families, "
-    "validation, whole-meshes, spheres, fresh-ridges, fairness, shading, hero, "
+    "saddle, sphere-ridge, extended, models, validation, whole-meshes, spheres, fresh-ridges, "
+    "fairness, shading, hero, "
     "published"
 )
 

@@ -322,7 +322,8 @@ def test_widths_that_symmetries_do_not_divide_are_refused(hidden):
 
 
 def test_only_a_scale_free_recipe_has_the_parts_of_one():
-    assert scale_free_parts(general())[2] == 1.0
+    recipe = general()
+    assert scale_free_parts(recipe) == (recipe.scale_free, recipe.vertex)
     with pytest.raises(ParameterError, match="scale-free"):
         scale_free_parts(signed())
 

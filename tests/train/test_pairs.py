@@ -9,14 +9,17 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pns_common import Mesh
+from pns_common.normals import measure_faces
+from pns_common.parallel import Blocks
 from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
 from train.data.pairs import references as subject
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
-from train.data.pairs.lathe import lathe_pair, turned
+from train.data.pairs.lathe import PLANS, centred, ears, lathe_pair, polygon, raised, random_lid
 from train.data.pairs.machined import machined_pairs
 from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.polygons import in_polygons, is_manifold, polygon_stream, remeshed
 from train.data.pairs.references import (
     WAYS,
     Pair,
@@ -76,24 +79,45 @@ def test_coarse_faces_look_the_way_the_surface_does(kind):
         np.testing.assert_allclose(np.linalg.norm(pair.surface.normals, axis=1), 1, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "kind", [solid_pairs, sphere_pair, faceted_pair, machined_pairs, lathe_pair]
-)
+@pytest.mark.parametrize("kind", CLOSED)
 def test_solids_are_closed(kind):
     for pair in drawn(kind):
         assert connect(pair.coarse.faces, len(pair.coarse.vertices)).paired.all()
 
 
-def test_a_turned_outline_is_the_prism_or_cone_that_it_draws():
-    """Volumes of n-gons' prisms and pyramids, lids with and without a vertex in the middle."""
+def test_an_outline_round_a_polygon_is_the_prism_or_pyramid_that_it_draws():
+    """Volumes, however quads and lids are cut; lids with and without a vertex in the middle."""
+    rng = np.random.default_rng(0)
     for sides in (3, 8, 17):
-        area = sides * np.sin(2 * np.pi / sides) / 2
-        for centres in ((True, True), (False, True), (False, False)):
-            prism = turned(np.array([[1.0, 0], [1, 3]]), sides, np.array(centres))
-            cone = turned(np.array([[1.0, 0], [0, 3]]), sides, np.array([centres[0], True]))
+        plan, area = polygon(sides), sides * np.sin(2 * np.pi / sides) / 2
+        middle, corners = centred(sides), ears(plan)
+        for lids, inner in (((middle, middle), 2), ((corners, middle), 1), ((corners,) * 2, 0)):
+            other_way = rng.random(sides) < 0.5
+            prism = raised(np.array([[1.0, 0], [1, 3]]), plan, lids, other_way)
+            pyramid = raised(np.array([[1.0, 0], [0, 3]]), plan, lids)
             assert volume(prism) == pytest.approx(3 * area)
-            assert volume(cone) == pytest.approx(area)
-            assert len(prism.faces) == 4 * sides - 2 * (2 - sum(centres))
+            assert volume(pyramid) == pytest.approx(area)
+            assert len(prism.faces) == 4 * sides - 2 * (2 - inner)
+
+
+def area(plan, triangles):
+    """Of each triangle, negative where it is clockwise."""
+    a, b, c = (np.append(plan, [[0.0, 0.0]], axis=0)[triangles[:, k]] for k in range(3))
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return (ux * vy - uy * vx) / 2
+
+
+@pytest.mark.parametrize("draw", PLANS)
+def test_a_plan_is_anticlockwise_and_every_lid_covers_it_once(draw):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        for plan in draw(rng):
+            x, y = plan.T
+            whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+            assert whole > 0
+            triangles = area(plan, random_lid(plan, rng))
+            assert triangles.min() > -1e-12
+            assert triangles.sum() == pytest.approx(whole)
 
 
 def test_the_stream_depends_on_its_seed_alone():
@@ -110,6 +134,54 @@ def test_the_stream_has_reference_length_one():
     for pair in begun(1):
         corners = pair.coarse.faces.reshape(-1)
         assert measure_reference_length(pair.coarse.vertices, corners) == pytest.approx(1)
+
+
+@cache
+def polygons(seed):
+    """The first pairs of a stream of polygons."""
+    return list(islice(polygon_stream(seed), 8))
+
+
+def test_polygons_are_mostly_quads_and_lie_on_their_surface_the_way_it_looks():
+    degrees = np.concatenate([np.diff(pair.coarse.offsets) for pair in polygons(0)])
+    assert (degrees == 4).mean() > 0.6
+    for pair in polygons(0):
+        mesh = pair.coarse
+        assert measure_reference_length(mesh.vertices, mesh.corners) == pytest.approx(1)
+        normals, _ = measure_faces(mesh.vertices, mesh.topology(), Blocks(), areas=False)
+        middle = np.array([mesh.vertices[face].mean(axis=0) for face in mesh.polygons])
+        _, nearest = cKDTree(pair.surface.points).query(middle)
+        assert np.median((normals * pair.surface.normals[nearest]).sum(axis=1)) > 0.9
+
+
+def test_a_stream_of_polygons_depends_on_its_seed_alone():
+    for a, b in zip(polygons(0), islice(polygon_stream(0), 8), strict=True):
+        np.testing.assert_array_equal(a.coarse.vertices, b.coarse.vertices)
+        np.testing.assert_array_equal(a.coarse.corners, b.coarse.corners)
+
+
+def test_triangles_of_a_drum_are_joined_to_its_quads_and_lids():
+    plan = polygon(12)
+    drum = raised(np.array([[1.0, 0], [1, 2]]), plan, (ears(plan), ears(plan)))
+    seen = set()
+    for seed in range(8):
+        made = in_polygons(drum, np.random.default_rng(seed))
+        degrees = np.bincount(np.diff(made.offsets), minlength=13)
+        assert volume(made.triangulated()) == pytest.approx(volume(drum))
+        assert is_manifold(made)
+        walls = [face for face in made.polygons if np.ptp(made.vertices[face, 2]) > 1]
+        assert [len(face) for face in walls] == [4] * 12
+        seen.add(int(degrees[12]))
+    assert seen == {0, 2}
+
+
+def test_a_sphere_in_quads_lies_on_it_with_about_the_faces_asked_for():
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        mesh = remeshed(SPHERE.vertices, SPHERE.faces, 400, rng)
+        assert mesh is not None
+        assert 100 < mesh.face_count < 400
+        assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 0.05
 
 
 def test_moved_pairs_keep_normals_at_right_angles():

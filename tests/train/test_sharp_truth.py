@@ -6,20 +6,23 @@ import pytest
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.pairs.faceted import sampled
-from train.data.pairs.lathe import turned
+from train.data.pairs.lathe import centred, polygon, raised
 from train.data.pairs.machined import true_edges
 from train.data.pairs.references import Pair, Reference, sharp_edges
 from train.data.sharp_labels import coarse_sharp_edges
 from train.metrics.shape import volume
 from train.surfaces.brep import box, chamfered, cut, cylinder, edge_groups, filleted, tessellated
 
-BOTH = np.array([True, True])
 CENTRED = (-1, -1, -1), (1, 1, 1)
 
 
 def drum(sides):
     """A cylinder of radius 1 and height 2."""
-    return turned(np.array([[1.0, -1], [1, 1]]), sides, BOTH)
+    return turned(np.array([[1.0, -1], [1, 1]]), sides)
+
+
+def turned(outline, sides):
+    return raised(outline, polygon(sides), (centred(sides),) * 2)
 
 
 def length(segments):
@@ -70,8 +73,8 @@ def test_the_rims_of_a_drum_are_sharp_and_its_sides_are_not(known):
 def test_edges_beside_a_sharp_one_are_not_sharp():
     """Bands beside a rim: the rim alone, though the bands' edges are as near as the reach."""
     shape = np.array([[1.0, 0], [1, 1], [1, 1.05], [1, 1.1], [0, 1.1]])
-    coarse = turned(shape, 16, BOTH)
-    fine = turned(shape, 176, BOTH)
+    coarse = turned(shape, 16)
+    fine = turned(shape, 176)
     surface = Reference(fine.vertices, fine.vertices)
     labels = coarse_sharp_edges(Pair("bands", coarse, surface, sharp_edges(fine)))
     heights = coarse.vertices[connect(coarse.faces, len(coarse.vertices)).edges.numpy()][..., 2]

@@ -18,11 +18,10 @@ from torch import Tensor
 
 from train.baselines.placement import midpoints, placed_edges
 from train.connectivity import Connectivity
-from train.loop_masks import loop_mask
+from train.loop_masks import limit_weight, loop_mask
 from train.reference import Step, Surroundings, edge_frames, read_edges
 from train.refining import Method, loop_rule
-from train.surfaces.quasi_interpolation import full_push, normal_push
-from train.tensors import shortened
+from train.tensors import dot, shortened, unit
 
 CLIPPED_STRENGTH = 0.6
 # C of NC, in units of R.
@@ -79,3 +78,22 @@ def _pushed(name: str, push: Push) -> Method:
         return replace(loop_rule(points, mesh, reference_length), displacement=pushed)
 
     return Method(name, step, learned_levels=1)
+
+
+def normal_push(points: Float[Tensor, "V 3"], mesh: Connectivity) -> Float[Tensor, "V 3"]:
+    """Return (e · m) m of every vertex, m its unit normal."""
+    normal = unit(Surroundings(mesh, points).mean_normal)
+    return dot(full_push(points, mesh), normal)[:, None] * normal
+
+
+def full_push(points: Float[Tensor, "V 3"], mesh: Connectivity) -> Float[Tensor, "V 3"]:
+    """Return e: what Loop's limit takes from every vertex.
+
+    Inside it is w (p − mean of the neighbours) with w = 8 k β / (8 k β + 3), also where one crease
+    ends; on curves (2 p − both neighbours) / 6; corners and isolated vertices stay.
+    """
+    around, (_, second, third) = Surroundings(mesh, points), mesh.sharpest[0].T
+    inside = -limit_weight(mesh.valence)[:, None] * around.umbrella
+    beside = points[mesh.sharpest[1]]
+    curve = (2 * points - beside[:, 0] - beside[:, 1]) / 6
+    return (1 - second)[:, None] * inside + (second - third)[:, None] * curve

@@ -65,7 +65,7 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
 
 def spectrum(scheme: AnyScheme, valence: int) -> np.ndarray:
     """Return |λ| of the linearisation at a flat star, largest first, translations left out."""
-    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence)(0.0), FINE))
+    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence, FINE)(0.0), FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 
@@ -75,7 +75,7 @@ def derivative_of_departure(scheme: AnyScheme, valence: int) -> float:
     One-sided: a gate with a kink at flat faces cancels in central differences, and automatic
     differentiation calls its slope 0 too.
     """
-    star, step = closed_star(scheme, valence)(0.0), TINY * SPOKE
+    star, step = closed_star(scheme, valence, TINY)(0.0), TINY * SPOKE
     mesh, count = perturbed_stars(star, step)
     refined, base = (
         refined_inner(star, refine(mesh, rule, 1, 1.0).mesh.vertices, 2 * count)

@@ -54,8 +54,10 @@ def disjoint_union(instances: Sequence[Instance]) -> Batch:
 def joined_meshes(meshes: Sequence[Mesh]) -> Mesh:
     """Return meshes side by side as one, in their order."""
     counts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + first for mesh, first in zip(meshes, counts[:-1], strict=True)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+    corners = [mesh.corners + first for mesh, first in zip(meshes, counts[:-1], strict=True)]
+    degrees = np.concatenate([np.diff(mesh.offsets) for mesh in meshes])
+    faces = np.concatenate(corners), np.append(0, np.cumsum(degrees))
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), faces)
 
 
 def pairs_sharing_a_face(mesh: Connectivity) -> Int[Tensor, "P 2"]:

@@ -9,22 +9,12 @@ from jaxtyping import Float
 
 from pns_common import Mesh
 from train.data.datasets import Dataset, Instance, grid_faces, jittered_grid
-from train.surfaces.cad import Fillet, RoundedBox, Torus
+from train.surfaces.cad import RoundedBox, Torus
 from train.surfaces.implicit import Surface
 
 JITTER = 0.04
 START = 4.0
 MARCHES = 400
-
-
-def fillets() -> Dataset:
-    """Return four fillets between two walls, radius 0.2 … 0.5."""
-    centre, sight = np.array([0.0, 0, 0]), np.array([0.0, 1, 1])
-    radii = np.linspace(0.2, 0.5, 4)
-    return Dataset(
-        "cad-fillet",
-        tuple(_instance(Fillet(r), centre, sight, seed) for seed, r in enumerate(radii)),
-    )
 
 
 def tori() -> Dataset:

@@ -11,9 +11,11 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from pns_common import Mesh
-from train.connectivity import connect
-from train.data.pairs.references import Pair, Reference, Segments, turns
-from train.vectors import angle, dot, face_normals, norm, unit
+from pns_common.kernels.connectivity import INTERIOR
+from pns_common.normals import measure_faces
+from pns_common.parallel import Blocks
+from train.data.pairs.references import Pair, Reference, Segments
+from train.vectors import angle, dot, norm, unit
 
 # Pieces of each coarse edge by which it is found; the share of its length that is to be covered.
 PIECES, COVERED = 4, 0.6
@@ -36,11 +38,13 @@ NEAREST = 12
 
 def coarse_sharp_edges(pair: Pair) -> Bool[np.ndarray, " E"]:
     """Return which edges of the coarse mesh, by first appearance, are sharp in truth."""
-    level = connect(pair.coarse.faces, len(pair.coarse.vertices))
-    edges, beside = level.edges.numpy(), level.half_edges.numpy() // 3
-    bends = level.paired.numpy() & (turns(pair.coarse, beside) > FLAT)
+    mesh, topology = pair.coarse, pair.coarse.topology()
+    edges, beside = topology.edges, topology.face_of(topology.half_edges)
+    normals, _ = measure_faces(mesh.vertices, topology, Blocks(), areas=False)
+    turn = angle(normals[beside[:, 0]], normals[beside[:, 1]])
+    bends = (topology.edge_class == INTERIOR) & (turn > FLAT)
     if pair.sharp is None:
-        return bends & _normals_jump(pair.coarse, edges, beside, pair.surface)
+        return bends & _normals_jump(mesh, normals, edges, beside, pair.surface)
     return _covered(pair.coarse.vertices[edges], pair.sharp, bends)
 
 
@@ -89,15 +93,18 @@ def _points_along(
 
 def _normals_jump(
     mesh: Mesh,
+    normals: Float[np.ndarray, "F 3"],
     edges: Int[np.ndarray, "E 2"],
     beside: Int[np.ndarray, "E 2"],
     surface: Reference,
 ) -> Bool[np.ndarray, " E"]:
     """Return at which edges the true normals jump, seen from three points of each edge."""
-    tree, normals = KDTree(surface.points), face_normals(mesh.vertices, mesh.faces)
+    tree, degrees = KDTree(surface.points), np.diff(mesh.offsets)
     first, second = mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]]
     along, votes = unit(second - first), np.zeros(len(edges))
-    apex = mesh.vertices[mesh.faces].sum(axis=1)[beside] - (first + second)[:, None]
+    sums = np.add.reduceat(mesh.vertices[mesh.corners], mesh.offsets[:-1])
+    others = (degrees - 2)[beside][..., None]
+    apex = (sums[beside] - (first + second)[:, None]) / others
     inward = np.cross(normals[beside], along[:, None])
     height = dot(apex - first[:, None], inward)[..., None]
     for share in (0.25, 0.5, 0.75):

@@ -144,7 +144,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
     }
 )
 # How often each family is drawn.
-SHARES = (0.42, 0.14, 0.10, 0.12, 0.12, 0.10)
+SHARES = (0.28, 0.12, 0.10, 0.30, 0.12, 0.08)
 
 
 def random_instance(rng: np.random.Generator) -> Instance:

@@ -2,6 +2,7 @@
 
 import csv
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import read_mesh
 from train.data.pairs.references import Segments, sharp_edges
+from train.data.remeshers import REMESHERS
 from train.data.simplifiers import SIMPLIFIERS
 
 # Faces of the coarse meshes, and how many meshes each shape gives.
@@ -48,7 +50,9 @@ class Drawn:
     faces: int
 
 
-def validation_meshes(folder: Path, most: int | None = None) -> list[Drawn]:
+def validation_meshes(
+    folder: Path, most: int | None = None, makers: Collection[str] = SIMPLIFIERS.keys()
+) -> list[Drawn]:
     """Return what to simplify, kind by kind in turn; `dense.csv` of the folder says the kinds.
 
     Files that it names and that are not there are left out. Simplifiers and sizes go round from
@@ -60,7 +64,7 @@ def validation_meshes(folder: Path, most: int | None = None) -> list[Drawn]:
     for number, (path, kind) in enumerate(listed):
         if path.is_file():
             kinds[kind].append((number, path))
-    names = list(SIMPLIFIERS)
+    names = list(makers)
     drawn = [
         Drawn(
             found[1], kind, names[(found[0] + 2 * turn) % len(names)], SIZES[(found[0] + turn) % 2]
@@ -84,9 +88,11 @@ def read_shape(path: Path, kind: str) -> Shape:
 
 
 def coarse_mesh(shape: Shape, drawn: Drawn) -> Mesh | None:
-    """Return a simplification; None where the shape is too small, or nothing is left."""
+    """Return a coarse mesh of a shape; None where that is too small, or nothing is left."""
     faces = min(drawn.faces, len(shape.mesh.faces) // LEAST_REDUCTION)
     try:
+        if drawn.simplifier in REMESHERS:
+            return REMESHERS[drawn.simplifier](shape.mesh, faces)
         return clean(SIMPLIFIERS[drawn.simplifier](shape.mesh, faces)).mesh
     except MeshError:
         return None

@@ -4,12 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from train.experiments.beyond import (
-    cad,
     fairness,
-    families,
-    features,
     fresh_ridges,
-    lifted_stars,
     models,
     shading,
     spheres,
@@ -46,13 +42,9 @@ ORDERED: tuple[Experiment, ...] = (
     capacity.EXPERIMENT,
     saddle.EXPERIMENT,
     sphere_ridge.EXPERIMENT,
-    features.EXPERIMENT,
     hero.EXPERIMENT,
     extended.EXPERIMENT,
-    lifted_stars.EXPERIMENT,
-    cad.EXPERIMENT,
     models.EXPERIMENT,
-    families.EXPERIMENT,
     validation.EXPERIMENT,
     whole_meshes.EXPERIMENT,
     spheres.EXPERIMENT,

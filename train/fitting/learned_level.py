@@ -9,7 +9,7 @@ gradients pass through z and w, with the order of weights around vertices and s 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
@@ -17,17 +17,21 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from pns_common import Mesh, loop, operator
+from pns_common import Mesh, Scheme, operator
+from pns_common.base_scheme import BaseScheme
 from pns_common.curves import Curves, find_curves
+from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR
 from pns_common.level import Level
+from pns_common.matrix import subdivision_matrix
+from pns_common.parallel import Blocks
 from pns_common.refinement import control_level
+from pns_common.schemes.scheme import named_scheme
 from pns_common.sharpness import sharpness_inputs
-from train.connectivity import connect
+from pns_common.topology import Topology
 from train.curve_rule import curve_push
 from train.data.batch import joined_meshes
 from train.fitting.sharp_masks import Sharpness, around_vertices, of_children, placed
-from train.loop_masks import loop_mask
 from train.models.networks import BoundedNet, Networks, SharpNet, unit_correction
 from train.models.recipe import Recipe, scale_free_parts
 from train.tensors import dot, shortened
@@ -38,9 +42,9 @@ class Inputs:
     """What surrounds a network at N new vertices, all but its answers.
 
     Attributes:
-        rows: their numbers among vertices, or among edges.
+        rows: their numbers among vertices, edges or faces.
         features: φ.
-        axes: F, or the three vectors of a ring, as columns.
+        axes: F, the three vectors of a ring, or a face's normal, as columns.
         gate, bound, reach: γ, ρ and τ h.
     """
 
@@ -54,9 +58,10 @@ class Inputs:
     def corrected(
         self, network: BoundedNet, prior: Float[Tensor, "M 3"], gate: Float[Tensor, " N"]
     ) -> Float[Tensor, "M 3"]:
-        """Return γ Π_ρ(D + τ h F z(φ)) at all M vertices or edges; 0 beside these rows."""
+        """Return γ Π_ρ(D + τ h F z(φ)) at all M vertices, edges or faces; 0 beside these rows."""
         z = unit_correction(network)(self.features)
-        wanted = prior[self.rows] + self.reach[:, None] * (self.axes @ z[:, :, None])[:, :, 0]
+        turned = (self.axes[:, :, : z.shape[1]] @ z[:, :, None])[:, :, 0]
+        wanted = prior[self.rows] + self.reach[:, None] * turned
         made = gate[:, None] * shortened(wanted, self.bound)
         return torch.zeros_like(prior).index_add(0, self.rows, made)
 
@@ -72,9 +77,10 @@ class LearnedLevel:
         smooth, smooth_split: the scheme's smooth rules at both levels.
         on_boundary: edges that are sharp for good.
         interior: the others, by row; psi, cap: their features and the most that w can be.
-        jumps, face_edges, sides: x, edges of faces, and both faces of the edges of `at_edges`.
+        jumps, corner_edges, corner_faces: x, and the edge after each corner, and its face.
+        sides: both faces of the edges of `at_edges`.
         degenerate: which of those have no frame.
-        at_edges, at_vertices: what surrounds both networks; γ of edges is their own part.
+        at_edges, at_vertices, at_faces: what surrounds the networks; γ of edges is their own part.
         push: d of vertices away from curves.
         numbers: of the library's rule, by name.
     """
@@ -92,11 +98,13 @@ class LearnedLevel:
     psi: Float[Tensor, "I P"]
     cap: Float[Tensor, " I"]
     jumps: Float[Tensor, " E"]
-    face_edges: Int[Tensor, "F 3"]
+    corner_edges: Int[Tensor, " H"]
+    corner_faces: Int[Tensor, " H"]
     sides: Int[Tensor, "N 2"]
     degenerate: Bool[Tensor, " N"]
     at_edges: Inputs
     at_vertices: Inputs
+    at_faces: Inputs
     push: Float[Tensor, "V 3"]
     numbers: dict[str, float]
 
@@ -120,12 +128,15 @@ class LearnedLevel:
         if networks is None:
             return base
         delta = self.displacement(sharp, networks)
+        # Where another edge is a little sharp, the boundary places no vertex alone.
+        shared = self.curves.shared.copy()
+        shared[: len(self.points)] &= sharp.third.detach().numpy() == 0
         scale = operator.guard_scale(
             self.level,
             base.detach().numpy(),
             delta.detach().numpy(),
             self.numbers["fold_angle"],
-            self.curves,
+            replace(self.curves, shared=shared),
         )
         return base + torch.from_numpy(scale)[:, None] * delta
 
@@ -149,12 +160,19 @@ class LearnedLevel:
         length = between[:, 1] - between[:, 0]
         middle = shortened(along[self.edges].mean(dim=1), n["budget"] * dot(length, length))
         w = sharp.edge
-        smoothed = (self.jumps * (1 - w))[self.face_edges].mean(dim=1)[self.sides].amin(dim=1)
+        bends = self.jumps.new_zeros(self.level.topology.face_count).index_add(
+            0, self.corner_faces, (self.jumps * (1 - w))[self.corner_edges]
+        ) / torch.bincount(self.corner_faces)
+        smoothed = bends[self.sides].amin(dim=1)
         opened = torch.where(self.degenerate, 0.0, torch.tanh(n["vertex_gate"] * smoothed))
         own = self.at_edges.gate
         gate = (1 - w[self.at_edges.rows]) * (own + (1 - own) * opened)
         edges = self.at_edges.corrected(networks.edge, prior[count : count + len(w)], gate)
-        return torch.cat([vertices + curved * on_curve, edges + w[:, None] * middle])
+        made = [vertices + curved * on_curve, edges + w[:, None] * middle]
+        if networks.face is not None:
+            gate = torch.tanh(n["vertex_gate"] * bends)
+            made += [self.at_faces.corrected(networks.face, prior[count + len(w) :], gate)]
+        return torch.cat(made)
 
     def second(self, sharp: Sharpness, first: Float[Tensor, "W 3"]) -> Float[Tensor, "M 3"]:
         """Return x₂ of x₁."""
@@ -168,7 +186,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
     Raises:
         ParameterError: the recipe is not scale-free.
     """
-    form, vertex_rule, strength = scale_free_parts(recipe)
+    form, vertex_rule = scale_free_parts(recipe)
     rule = operator.Rule(
         edge_network=_not_asked,
         feature_count=18,
@@ -181,43 +199,46 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         network_scale=form.network_scale,
     )
     unit_prior = operator.Rule(**{**vars(rule), "prior_strength": 1.0})
-    mesh = joined_meshes(meshes)
-    level = control_level(mesh, loop(), 1.0, None, threads=1)
-    topology = level.topology
+    mesh, scheme = joined_meshes(meshes), named_scheme(form.base)
+    level = control_level(mesh, scheme, 1.0, None, threads=1)
+    topology, base = level.topology, level.base
+    split = base.split(topology, Blocks(), inherit=False)
     edges = topology.edges.astype(np.int64)
     at_edges = operator.edge_inputs(level, rule, topology.interior)
     at_vertices = operator.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
-    psi, cap = _psi(meshes, vertex_rule.gate_sharpness)
-    control = connect(mesh.faces, len(mesh.vertices))
-    assert np.array_equal(control.edges.numpy(), edges)
-    split = connect(control.split().numpy(), len(mesh.vertices) + len(edges))
-    low, high = split.edges.T
+    at_faces = operator.face_inputs(level, rule, np.arange(topology.face_count * base.polygons))
+    psi, cap = _psi(meshes, scheme, vertex_rule.gate_sharpness)
+    split_edges = torch.from_numpy(split.edges.astype(np.int64))
+    low, high = split_edges.T
     made = high - len(mesh.vertices)
-    is_half = (low < len(mesh.vertices)) & (made >= 0)
+    is_half = (low < len(mesh.vertices)) & (made >= 0) & (made < len(edges))
+    faces = np.arange(topology.face_count)
     return LearnedLevel(
         # Without what was measured: this travels between processes.
         level=Level(level.points, topology, level.base, 1.0, level.blocks),
-        curves=find_curves(level.points, topology),
+        curves=find_curves(level.points, topology, split.vertex_count),
         points=torch.from_numpy(np.array(level.points)),
         edges=torch.from_numpy(edges),
-        split_edges=split.edges,
+        split_edges=split_edges,
         halves=torch.where(is_half, made, -1),
-        smooth=loop_mask(control).matrix(),
-        smooth_split=loop_mask(split).matrix(),
-        on_boundary=~control.paired,
+        smooth=sparse_matrix(topology, base),
+        smooth_split=sparse_matrix(split, base),
+        on_boundary=torch.from_numpy(topology.edge_class != INTERIOR),
         interior=torch.from_numpy(topology.interior.astype(np.int64)),
         psi=torch.from_numpy(psi),
         cap=torch.from_numpy(cap),
         jumps=torch.from_numpy(level.edges.jumps),
-        face_edges=torch.from_numpy(topology.face_edges.astype(np.int64)),
-        sides=torch.from_numpy(topology.half_edges[at_edges.rows].astype(np.int64) // 3),
+        corner_edges=torch.from_numpy(topology.corner_edges.astype(np.int64)),
+        corner_faces=torch.from_numpy(np.repeat(faces, np.diff(topology.offsets))),
+        sides=torch.from_numpy(topology.face_of(topology.half_edges[at_edges.rows]).astype(int)),
         degenerate=torch.from_numpy(at_edges.degenerate),
         at_edges=_inputs(at_edges),
         at_vertices=_inputs(at_vertices),
+        at_faces=_inputs(at_faces),
         push=torch.from_numpy(operator.pushes(level, unit_prior)),
         numbers={
             "budget": recipe.budget,
-            "strength": strength,
+            "strength": form.prior_strength,
             "curve": form.boundary_strength,
             "vertex_gate": vertex_rule.gate_sharpness,
             "fold_angle": math.radians(form.fold_angle),
@@ -225,9 +246,17 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
     )
 
 
-def _psi(meshes: Sequence[Mesh], gate_sharpness: float) -> tuple[np.ndarray, np.ndarray]:
+def sparse_matrix(topology: Topology, base: BaseScheme) -> sparse.csr_array:
+    """Return the masks of one level of a scheme."""
+    made = subdivision_matrix([topology], base)
+    return sparse.csr_array((made.weights, made.columns, made.starts), shape=made.shape)
+
+
+def _psi(
+    meshes: Sequence[Mesh], scheme: Scheme, gate_sharpness: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return features and caps of sharpness; some features are those of a whole mesh."""
-    levels = [control_level(mesh, loop(), 1.0, None, threads=1) for mesh in meshes]
+    levels = [control_level(mesh, scheme, 1.0, None, threads=1) for mesh in meshes]
     made = [sharpness_inputs(level, gate_sharpness)[1:] for level in levels]
     psi, cap = zip(*made, strict=True)
     return np.concatenate(psi), np.concatenate(cap)

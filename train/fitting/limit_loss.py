@@ -94,6 +94,7 @@ def limit_loss(
 
 
 def sharpness_loss(batch: LimitBatch, logits: Float[Tensor, " I"]) -> Float[Tensor, ""]:
-    """Return the mean cross entropy of w and truth."""
+    """Return the mean over the meshes of the cross entropy of w and truth, weighted by turns."""
     w = (batch.level.cap * torch.sigmoid(logits)).clamp(LEAST_W, 1 - LEAST_W)
-    return torch.nn.functional.binary_cross_entropy(w, batch.sharp)
+    entropy = torch.nn.functional.binary_cross_entropy(w, batch.sharp, reduction="none")
+    return batch.per_mesh(batch.edge_share * entropy, batch.edge_owner).mean()

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from train.data.pairs.pair_stream import pair_stream
+from train.data.pairs.polygons import polygon_stream
 from train.data.pairs.references import Pair
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch, limit_batch
@@ -33,17 +34,17 @@ def fit_to_limit(
 ) -> tuple[Networks, tuple[float, ...]]:
     """Return the trained networks of a scale-free recipe, and the loss before each step.
 
-    Sharpness alone is trained first, against the truth; then all three networks on the limit.
+    Sharpness alone is trained first, against the truth; then all networks on the limit.
     """
     with deterministic():
         networks = initial_networks(recipe)
-        weights = list(networks.parameters())
+        weights = [each for each in networks.parameters() if each.requires_grad]
         optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP
         )
         losses: list[float] = []
-        for batch, reference in _batches(recipe, plan):
+        for batch, reference in batches(recipe, plan):
             logits = batch.level.logits(networks.sharp)
             loss = plan.weights.sharp * sharpness_loss(batch, logits)
             if len(losses) >= plan.start:
@@ -75,7 +76,7 @@ def reference_of(batch: LimitBatch) -> LimitMeasures:
         return measure(batch, batch.level.second(smooth, batch.level.first(smooth, None)))
 
 
-def _batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
+def batches(recipe: Recipe, plan: ToLimit) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     """Yield one batch a step, drawn from a pool that grows until its oldest give way to new ones.
 
     Making a batch takes as long as some ten steps on it, so another process makes the next one.
@@ -113,9 +114,10 @@ def _fresh(
     recipe: Recipe, plan: ToLimit, rng: np.random.Generator
 ) -> Iterator[tuple[LimitBatch, LimitMeasures]]:
     waiting: list[Pair] = []
-    for pair in pair_stream(recipe.seed):
+    pairs = pair_stream if recipe.face is None else polygon_stream
+    for pair in pairs(recipe.seed):
         waiting.append(pair)
-        if sum(len(mesh_pair.coarse.faces) for mesh_pair in waiting) >= plan.faces:
+        if sum(mesh_pair.coarse.face_count for mesh_pair in waiting) >= plan.faces:
             batch = limit_batch(waiting, recipe, rng)
             waiting = []
             yield batch, reference_of(batch)

@@ -30,13 +30,14 @@ Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 class Fit:
     """Trained float32 networks and the loss before each step.
 
-    `vertex_network` and `sharpness_network` are None where the recipe has none.
+    The others than `network` are None where the recipe has none.
     """
 
     network: BoundedNet
     losses: tuple[float, ...]
     vertex_network: BoundedNet | None = None
     sharpness_network: SharpNet | None = None
+    face_network: BoundedNet | None = None
 
 
 def fit(recipe: Recipe, on_step: OnStep) -> Fit:
@@ -44,7 +45,7 @@ def fit(recipe: Recipe, on_step: OnStep) -> Fit:
     match recipe.training:
         case ToLimit() as plan:
             made, losses = fit_to_limit(recipe, plan, on_step)
-            return Fit(made.edge, losses, made.vertex, made.sharp)
+            return Fit(made.edge, losses, made.vertex, made.sharp, made.face)
         case OneStep():
             quiet = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
             return optimise(recipe, quiet, on_step)

@@ -1,13 +1,22 @@
 """What a recipe makes of edges and vertices: its untrained networks, and their rules."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+import onnx
 import torch
+from onnx import numpy_helper
 
-from pns_common import ParameterError
-from pns_common.features import FEATURE_SETS, RING_FEATURE_SETS, FeatureSet
+from pns_common import ParameterError, load_model
+from pns_common.features import (
+    FACE_FEATURE_SETS,
+    FEATURE_SETS,
+    RING_FEATURE_SETS,
+    FeatureSet,
+    Symmetries,
+)
 from train.models.networks import (
     INPUT_COUNT,
     BoundedNet,
@@ -38,11 +47,16 @@ FEATURE_SIZES: Mapping[str, float] = MappingProxyType(
         "neighbours' umbrella height": 0.07,
         "opening": 0.14,
         "neighbours' mean jump": 0.05,
+        "mean bend": 0.1,
+        "middle of the bends": 0.1,
+        "half the range of the bends": 0.1,
+        "corners' umbrella height": 0.08,
+        "half the range of these heights": 0.05,
     }
 )
 
 # Each network has a draw of its own.
-VERTEX_SEED, SHARP_SEED = 1 << 20, 1 << 21
+VERTEX_SEED, SHARP_SEED, FACE_SEED = 1 << 20, 1 << 21, 1 << 22
 
 
 def initial_network(recipe: Recipe) -> BoundedNet:
@@ -51,7 +65,7 @@ def initial_network(recipe: Recipe) -> BoundedNet:
     if recipe.orientation != "symmetric":
         return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
     seen = FEATURE_SETS[recipe.features]
-    return _keeping_symmetry(recipe, seen, recipe.hidden, generator)
+    return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.hidden, generator)
 
 
 def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
@@ -60,16 +74,38 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
         return None
     generator = torch.Generator().manual_seed(VERTEX_SEED + recipe.seed)
     seen = RING_FEATURE_SETS[recipe.vertex.features]
-    return _keeping_symmetry(recipe, seen, recipe.vertex.hidden, generator)
+    return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.vertex.hidden, generator)
 
 
 def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
-    """Return the untrained sharpness network of a recipe; None where it has none."""
+    """Return the untrained sharpness network of a recipe, or another model's; None without one."""
     seen = recipe.sharpness
     if seen is None:
         return None
     generator = torch.Generator().manual_seed(SHARP_SEED + recipe.seed)
-    return SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+    made = SharpNet(INPUT_COUNT[seen.features], seen.hidden, recipe.activation, generator)
+    return made if seen.of_model is None else taken_over(made, seen.of_model)
+
+
+def taken_over(network: SharpNet, model: str) -> SharpNet:
+    """Return a sharpness network with the weights of a bundled model's, which stay as they are."""
+    graph = onnx.load_from_string(load_model(model).data).graph
+    arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    for number, layer in enumerate(network.linear_layers):
+        layer.weight.data.copy_(torch.from_numpy(arrays[f"sharpness_weight_{number}"].copy()))
+        layer.bias.data.copy_(torch.from_numpy(arrays[f"sharpness_bias_{number}"].copy()))
+    return network.requires_grad_(False)
+
+
+def initial_face_network(recipe: Recipe) -> BoundedNet | None:
+    """Return the untrained face network of a recipe; None where its scheme has none."""
+    if recipe.face is None:
+        return None
+    generator = torch.Generator().manual_seed(FACE_SEED + recipe.seed)
+    seen = FACE_FEATURE_SETS[recipe.face.features]
+    # It answers along the normal alone.
+    along = replace(seen.symmetries, local=seen.symmetries.local[:, :1])
+    return _keeping_symmetry(recipe, seen, along, recipe.face.hidden, generator)
 
 
 def initial_networks(recipe: Recipe) -> Networks:
@@ -81,12 +117,13 @@ def initial_networks(recipe: Recipe) -> Networks:
     vertex, sharp = initial_vertex_network(recipe), initial_sharpness_network(recipe)
     if vertex is None or sharp is None:
         raise ParameterError("recipe", recipe.name, expected="three networks")
-    return Networks(initial_network(recipe), vertex, sharp)
+    return Networks(initial_network(recipe), vertex, sharp, initial_face_network(recipe))
 
 
 def _keeping_symmetry(
     recipe: Recipe,
     seen: FeatureSet,
+    group: Symmetries,
     hidden: tuple[int, ...],
     generator: torch.Generator,
 ) -> BoundedNet:
@@ -95,7 +132,6 @@ def _keeping_symmetry(
     Raises:
         ParameterError: a layer of a tied network is no whole number of copies of the group.
     """
-    group = seen.symmetries
     if recipe.scale_free is None:
         return SymmetricNet(group, hidden, recipe.activation, generator)
     if any(width < 1 or width % len(group.order) for width in hidden):
@@ -123,14 +159,14 @@ def general_rule(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet
     Raises:
         ParameterError: the recipe is not scale-free, or has no vertex rule.
     """
-    form, vertex_rule, strength = scale_free_parts(recipe)
+    form, vertex_rule = scale_free_parts(recipe)
     return GeneralRule(
         unit_correction(network),
         unit_correction(vertex_network),
         recipe.budget,
         recipe.gate_sharpness,
         vertex_rule.gate_sharpness,
-        strength,
+        form.prior_strength,
         form.boundary_strength,
         form.network_scale,
         form.fold_angle,

@@ -30,8 +30,9 @@ ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
 class BoundedNet(nn.Module):
     """A small perceptron whose output never leaves the ball: η = C z / max(1, ‖z‖).
 
-    The bound holds for any weights. Its layers are `net.0`, `net.2`, …, as in the published state
-    dictionaries. Source: paper, PNS operator and algorithm.
+    Answers are vectors, or with `outputs` 1 lengths. The bound holds for any weights. Its layers
+    are `net.0`, `net.2`, …, as in the published state dictionaries. Source: paper, PNS operator and
+    algorithm.
     """
 
     def __init__(
@@ -40,19 +41,20 @@ class BoundedNet(nn.Module):
         hidden: tuple[int, ...],
         activation: str,
         generator: torch.Generator,
+        outputs: int = 3,
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, 3), activation, generator)
+        self.net = perceptron((feature_count, *hidden, outputs), activation, generator)
 
     def forward(
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
-    ) -> Float[Tensor, "E 3"]:
+    ) -> Float[Tensor, "E A"]:
         """Return η with ‖η‖ ≤ budget."""
         z = self.raw(features)
         return budget * z / torch.linalg.vector_norm(z, dim=-1, keepdim=True).clamp(min=1)
 
-    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
+    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E A"]:
         """Return z, of any length."""
         return self.net(features)
 
@@ -74,7 +76,7 @@ class SharpNet(nn.Module):
     ):
         super().__init__()
         self.activation = activation
-        self.net = _perceptron((feature_count, *hidden, 1), activation, generator)
+        self.net = perceptron((feature_count, *hidden, 1), activation, generator)
 
     def forward(self, features: Float[Tensor, "N K"]) -> Float[Tensor, "N 1"]:
         """Return the answer before the sigmoid."""
@@ -87,11 +89,13 @@ class SharpNet(nn.Module):
 
 
 class Networks(nn.Module):
-    """The networks of a scale-free rule."""
+    """The networks of a scale-free rule; `face` where its base scheme is Catmull–Clark's."""
 
-    def __init__(self, edge: BoundedNet, vertex: BoundedNet, sharp: SharpNet):
+    def __init__(
+        self, edge: BoundedNet, vertex: BoundedNet, sharp: SharpNet, face: BoundedNet | None = None
+    ):
         super().__init__()
-        self.edge, self.vertex, self.sharp = edge, vertex, sharp
+        self.edge, self.vertex, self.sharp, self.face = edge, vertex, sharp, face
 
 
 class SymmetricNet(BoundedNet):
@@ -129,7 +133,7 @@ def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
     The geometry is float64, the network keeps its own precision, as in the product.
     """
 
-    def correction(features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
+    def correction(features: Float[Tensor, "E K"]) -> Float[Tensor, "E A"]:
         own = network.linear_layers[0].weight.dtype
         return network(features.to(own), 1.0).to(features.dtype)
 
@@ -141,9 +145,10 @@ def _single(values: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
     return torch.from_numpy(values.astype(np.float32))
 
 
-def _perceptron(
+def perceptron(
     widths: tuple[int, ...], activation: str, generator: torch.Generator
 ) -> nn.Sequential:
+    """Return linear layers from each width to the next, and activations between them."""
     layers: list[nn.Module] = []
     for fan_in, fan_out in pairwise(widths):
         layers += [_seeded_linear(fan_in, fan_out, generator), ACTIVATIONS[activation]()]

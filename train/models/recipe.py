@@ -47,11 +47,18 @@ class VertexRule:
 
 
 @dataclass(frozen=True, slots=True)
-class SharpnessRule:
-    """The sharpness network: its features and hidden widths."""
+class NetworkShape:
+    """The sharpness or the face network.
+
+    Attributes:
+        features: name of its features.
+        hidden: hidden widths.
+        of_model: a bundled model whose sharpness network is taken over and not trained.
+    """
 
     features: str
     hidden: tuple[int, ...]
+    of_model: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +112,6 @@ class ToLimit(msgspec.Struct, frozen=True, tag=True):
         faces: coarse faces in a batch, about.
         pool: batches kept to draw from, at most.
         reuse: after every so many steps a new batch comes in, in the end for the oldest.
-        trained_strength: s of the prior while the networks are trained; in use it is the form's.
         start: steps at the beginning in which sharpness alone is trained, against the truth.
     """
 
@@ -113,7 +119,6 @@ class ToLimit(msgspec.Struct, frozen=True, tag=True):
     faces: int
     pool: int
     reuse: int
-    trained_strength: float
     start: int
 
 
@@ -135,6 +140,7 @@ class Recipe:
         vertex: the learned rule for old vertices; None leaves them to Loop.
         scale_free: the rule of format 4; None is the paper's.
         sharpness: its sharpness network.
+        face: its network of face vertices, over Catmull–Clark.
     """
 
     name: str
@@ -150,7 +156,8 @@ class Recipe:
     orientation: str = "first-face"
     vertex: VertexRule | None = None
     scale_free: ScaleFree | None = None
-    sharpness: SharpnessRule | None = None
+    sharpness: NetworkShape | None = None
+    face: NetworkShape | None = None
 
 
 def one_step(recipe: Recipe) -> OneStep:
@@ -164,13 +171,13 @@ def one_step(recipe: Recipe) -> OneStep:
     return recipe.training
 
 
-def scale_free_parts(recipe: Recipe) -> tuple[ScaleFree, VertexRule, float]:
-    """Return a scale-free recipe's form, vertex rule, and strength of the prior in training.
+def scale_free_parts(recipe: Recipe) -> tuple[ScaleFree, VertexRule]:
+    """Return a scale-free recipe's form and vertex rule.
 
     Raises:
         ParameterError: it is not scale-free, or has no vertex rule.
     """
-    form, rule, plan = recipe.scale_free, recipe.vertex, recipe.training
-    if form is None or rule is None or not isinstance(plan, ToLimit):
+    form, rule = recipe.scale_free, recipe.vertex
+    if form is None or rule is None:
         raise ParameterError("recipe", recipe.name, expected="a scale-free one with a vertex rule")
-    return form, rule, plan.trained_strength
+    return form, rule

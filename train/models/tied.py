@@ -40,7 +40,11 @@ class TiedNet(BoundedNet):
     ):
         size = len(group.order)
         super().__init__(
-            group.order.shape[1], tuple(size * m for m in copies), activation, generator
+            group.order.shape[1],
+            tuple(size * m for m in copies),
+            activation,
+            generator,
+            outputs=group.local.shape[1],
         )
         first, *hidden, last = self.linear_layers
         _tie(first, _TiedFirst(group), _Repeated(size))
@@ -117,7 +121,7 @@ class _TiedHidden(nn.Module):
 
 
 class _TiedLast(nn.Module):
-    """v (3, m) as columns (g, i): D_g v_i."""
+    """v (A, m) as columns (g, i): D_g v_i."""
 
     local: Tensor
 
@@ -125,10 +129,10 @@ class _TiedLast(nn.Module):
         super().__init__()
         self.register_buffer("local", _signs(group.local), persistent=False)
 
-    def forward(self, free: Float[Tensor, "3 m"]) -> Float[Tensor, "3 Gm"]:
+    def forward(self, free: Float[Tensor, "A m"]) -> Float[Tensor, "A Gm"]:
         return (self.local.T[:, :, None] * free[:, None, :]).flatten(1)
 
-    def right_inverse(self, dense: Float[Tensor, "3 Gm"]) -> Float[Tensor, "3 m"]:
+    def right_inverse(self, dense: Float[Tensor, "A Gm"]) -> Float[Tensor, "A m"]:
         return dense[:, : dense.shape[1] // len(self.local)].clone()
 
 
@@ -156,10 +160,10 @@ class _Invariant(nn.Module):
         kept = (group.local == 1).all(axis=0).astype(float)
         self.register_buffer("kept", _signs(kept), persistent=False)
 
-    def forward(self, free: Float[Tensor, "3"]) -> Float[Tensor, "3"]:
+    def forward(self, free: Float[Tensor, " A"]) -> Float[Tensor, " A"]:
         return free * self.kept
 
-    def right_inverse(self, dense: Float[Tensor, "3"]) -> Float[Tensor, "3"]:
+    def right_inverse(self, dense: Float[Tensor, " A"]) -> Float[Tensor, " A"]:
         return dense
 
 

@@ -58,11 +58,12 @@ def reif_gap(size: Float[np.ndarray, " M"]) -> float:
     return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
 
 
-def closed_star(scheme: AnyScheme, valence: int) -> Callable[[float], Star]:
+def closed_star(scheme: AnyScheme, valence: int, shake: float = 1 / 20) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
     Two rings suffice where an edge sees its two faces and a vertex its neighbours; a scheme that
-    sees further gets more. Tried out: what lies outside must change nothing.
+    sees further gets more. Tried out on a star shaken by so many spokes: what lies outside must
+    change nothing. Sharpness looks at the whole mesh, but near a plane nothing is sharp.
 
     Raises:
         ParameterError: the scheme sees further than all rings tried.
@@ -71,7 +72,7 @@ def closed_star(scheme: AnyScheme, valence: int) -> Callable[[float], Star]:
         build = partial(stars.star, valence, rings, SPOKE, inner_rings=inner_rings)
         alone = build(0.0)
         wider = stars.star(valence, rings + 2, SPOKE, inner_rings=inner_rings)
-        noise = np.random.default_rng(0).standard_normal(wider.mesh.vertices.shape) * SPOKE / 20
+        noise = np.random.default_rng(0).standard_normal(wider.mesh.vertices.shape) * SPOKE * shake
         refined = []
         for star in (alone, wider):
             mesh = Mesh(star.mesh.vertices + noise[: len(star.mesh.vertices)], star.mesh.faces)

@@ -25,7 +25,7 @@ BLOCKS = 0.6
 BOXES, PRISMS = 0.2, 0.4
 
 # How often it is left as it is, with as few faces as modellers draw.
-AS_DRAWN = 0.25
+AS_DRAWN = 0.4
 
 # Cells along each side of a block's grid.
 CELLS = 5
@@ -36,7 +36,7 @@ THINNEST, WIDEST = 0.08, 1.0
 
 def faceted_pair(rng: np.random.Generator) -> Pair | None:
     """Return a coarse mesh of a random polyhedron; None where collapses spoilt it."""
-    made = block(rng) if rng.random() < BLOCKS else _hull(_corners(rng))
+    made = polyhedron(rng)
     if made is None:
         return None
     points, faces = made
@@ -57,6 +57,13 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     if coarse is None:
         return None
     return Pair("faceted", coarse, sampled(points, faces, rng), sharp)
+
+
+def polyhedron(
+    rng: np.random.Generator,
+) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]] | None:
+    """Return the surface of a block, or a convex hull; None where it is no manifold."""
+    return block(rng) if rng.random() < BLOCKS else _hull(_corners(rng))
 
 
 def block(
@@ -101,7 +108,7 @@ def _corners(rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return signs * size
     if kind < BOXES + PRISMS:
-        count, taper = int(rng.integers(3, 8)), rng.uniform(0.3, 1.0)
+        count, taper = int(rng.integers(3, 7)), rng.uniform(0.3, 1.0)
         angle = 2 * np.pi * np.arange(count) / count
         ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
         return np.concatenate([ring - [0, 0, 1], ring * [taper, taper, 1] + [0, 0, 1]]) * size

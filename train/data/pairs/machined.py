@@ -7,7 +7,7 @@ import numpy as np
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold
-from train.data.pairs.references import LEAST_SHARP, Pair, Reference, coarsened
+from train.data.pairs.references import LEAST_SHARP, Coarsen, Pair, Reference, coarsened
 from train.surfaces.brep import Tessellation, tessellated
 from train.surfaces.machined import machined_part
 from train.surfaces.solids import random_rotation
@@ -31,7 +31,7 @@ MOST_DENSE = 40_000
 EACH = 4
 
 
-def machined_pairs(rng: np.random.Generator) -> Iterator[Pair]:
+def machined_pairs(rng: np.random.Generator, coarsen: Coarsen = coarsened) -> Iterator[Pair]:
     """Yield coarse meshes of one random part, closed manifolds all."""
     shape = machined_part(rng)
     part = tessellated(shape, DEFLECTION, rng.uniform(*ANGLES))
@@ -47,10 +47,10 @@ def machined_pairs(rng: np.random.Generator) -> Iterator[Pair]:
     coarse = Mesh(drawn.vertices @ turn, drawn.faces)
     if len(coarse.faces) <= MOST and is_manifold(coarse):
         yield Pair("machined", coarse, surface, sharp)
-    for _ in range(EACH):
-        most = min(MOST, len(dense.faces) // 2)
-        count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(max(most, FEWEST + 1)))))
-        coarse = coarsened(dense.vertices @ turn, dense.faces, count, rng)
+    most = min(MOST, len(dense.faces) // 2)
+    for _ in range(EACH if most > FEWEST else 0):
+        count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(most))))
+        coarse = coarsen(dense.vertices @ turn, dense.faces, count, rng)
         if coarse is not None:
             yield Pair("machined", coarse, surface, sharp)
 

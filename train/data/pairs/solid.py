@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pns_common import Mesh, MeshError
-from train.data.pairs.references import Pair, Reference, coarsened
+from pns_common import MeshError
+from train.data.pairs.references import Coarsen, Pair, Reference, coarsened
+from train.data.remeshers import with_points
 from train.surfaces.marching import laid_onto, marched, unit_gradient
 from train.surfaces.solids import Field, random_solid
 
@@ -29,7 +30,7 @@ ON_SURFACE = 0.16
 EACH = 5
 
 
-def solid_pairs(rng: np.random.Generator) -> Iterator[Pair]:
+def solid_pairs(rng: np.random.Generator, coarsen: Coarsen = coarsened) -> Iterator[Pair]:
     """Yield up to five coarse meshes of one random solid, closed manifolds all."""
     field = _framed(random_solid(rng))
     if field is None:
@@ -42,11 +43,11 @@ def solid_pairs(rng: np.random.Generator) -> Iterator[Pair]:
     surface = Reference(points, unit_gradient(field, points))
     for _ in range(EACH):
         on_surface = rng.random() < ON_SURFACE
-        coarse = coarsened(points, dense.faces, _size(rng, len(dense.faces)), rng)
+        coarse = coarsen(points, dense.faces, _size(rng, len(dense.faces)), rng)
         if coarse is None:
             continue
         if on_surface:
-            coarse = Mesh(laid_onto(field, coarse.vertices), coarse.faces)
+            coarse = with_points(coarse, laid_onto(field, coarse.vertices))
         yield Pair("laid" if on_surface else "collapsed", coarse, surface)
 
 

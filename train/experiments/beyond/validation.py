@@ -14,16 +14,19 @@ import typer
 from jaxtyping import Int
 from rich.console import Console
 
-from pns_common import Mesh, load_model, loop, pns
+from pns_common import Mesh, catmull_clark, load_model, loop, pns
 from pns_common import sharp_edges as found_sharp_edges
 from pns_common.model.card import ModelCard
+from pns_common.model.file import COMPANIONS, DEFAULT_MODEL
 from pns_common.model.session import Model
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.controls import flat, n1
+from train.baselines.neural_subdivision import neural_subdivision
 from train.baselines.pn_triangles import pn_triangles
-from train.connectivity import connect
 from train.data.pairs.references import Pair, Reference
+from train.data.remeshers import REMESHERS
 from train.data.sharp_labels import coarse_sharp_edges
+from train.data.simplifiers import SIMPLIFIERS
 from train.data.validation import Drawn, coarse_mesh, read_shape, validation_meshes
 from train.experiments.beyond.models import models_and_assets
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
@@ -37,6 +40,7 @@ from train.refining import AnyScheme, refine
 LEVELS, SAMPLES = 2, 5000
 
 LOOP, FLAT, OURS, ZERO = "Loop", "Flat", "PNS", "PNS, networks at zero"
+CATMULL_CLARK = "Catmull–Clark"
 
 # Degrees at which PN triangles split normals.
 SPLIT = 40.0
@@ -51,7 +55,8 @@ NOTE = (
     "how far the largest angle between neighbouring faces exceeds the dense mesh's own, mean in "
     "degrees. *Crossing* is the number of faces that pass through others, over the larger of "
     "Loop's and the control mesh's, summed. *Precision* and *recall* are of the coarse edges that "
-    "are sharp in truth, on parts and buildings."
+    "are sharp in truth, on parts and buildings. *Neural Subdivision* has the form of Liu et al. "
+    "2020, trained on the default model's stream."
 )
 
 
@@ -87,6 +92,10 @@ class ZeroNetworks:
         """Return no correction of vertices."""
         return np.zeros((len(features), 3), dtype=np.float32)
 
+    def face_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
+        """Return no correction of face vertices."""
+        return np.zeros((len(features), 1), dtype=np.float32)
+
     def sharpness(self, features: np.ndarray) -> np.ndarray:
         """Return the model's own sharpness of edges."""
         return self.model.sharpness(features)
@@ -94,10 +103,14 @@ class ZeroNetworks:
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """A method, and the edges of a coarse mesh that it takes for sharp, if it takes any."""
+    """A method, and the edges of a coarse mesh that it takes for sharp, if it takes any.
+
+    Where it refines triangles alone, polygons are `cut` for it.
+    """
 
     scheme: AnyScheme
     sharp: Callable[[Mesh], Int[np.ndarray, "N 2"]] | None = None
+    cut: bool = False
 
 
 def contenders(model: Model) -> dict[str, Contender]:
@@ -111,6 +124,18 @@ def contenders(model: Model) -> dict[str, Contender]:
         ),
         "Butterfly": Contender(modified_butterfly()),
         "N1": Contender(n1()),
+        "Neural Subdivision": Contender(neural_subdivision()),
+        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
+        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
+    }
+
+
+def polygon_contenders(model: Model) -> dict[str, Contender]:
+    """Return the methods for polygons, Catmull–Clark first."""
+    ours, zero = pns(model), pns(ZeroNetworks(model))
+    return {
+        CATMULL_CLARK: Contender(catmull_clark()),
+        FLAT: Contender(flat(), cut=True),
         ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
         OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
     }
@@ -189,13 +214,14 @@ def measured(drawn: Sequence[Drawn], methods: Mapping[str, Contender]) -> list[M
         if shape.sharp is not None:
             sharp = coarse_sharp_edges(Pair(shape.kind, coarse, surface, shape.sharp))
         for name, method in methods.items():
-            mesh = refine(coarse, method.scheme, LEVELS).mesh
+            control = coarse.triangulated() if method.cut else coarse
+            mesh = refine(control, method.scheme, LEVELS).mesh.triangulated()
             rows.append(
                 Measured(
                     shape.name,
                     shape.kind,
                     each.simplifier,
-                    len(coarse.faces),
+                    coarse.face_count,
                     name,
                     surface_errors(true, prepared(mesh, SAMPLES)),
                     float(np.degrees(max(normal_jump(mesh) - turn, 0.0))),
@@ -212,7 +238,7 @@ def _counted(
     """Return how many edges are taken for sharp, how many of them are, and how many are at all."""
     if method.sharp is None or sharp is None:
         return None, None, None
-    edges, count = connect(mesh.faces, len(mesh.vertices)).edges.numpy(), len(mesh.vertices)
+    edges, count = mesh.topology().edges.astype(np.int64), len(mesh.vertices)
     found = np.sort(method.sharp(mesh), axis=1)
     taken = np.isin(edges @ [count, 1], found @ [count, 1])
     return int(taken.sum()), int((taken & sharp).sum()), int(sharp.sum())
@@ -228,7 +254,7 @@ def summary(measured: Sequence[Measured]) -> list[Summary]:
             method: [row for row in own if row.method == method]
             for method in dict.fromkeys(row.method for row in own)
         }
-        loops, flats = by_method[LOOP], by_method[FLAT]
+        loops, flats = next(iter(by_method.values())), by_method[FLAT]
         allowed = sum(max(a.crossing, b.crossing) for a, b in zip(loops, flats, strict=True))
         for method, these in by_method.items():
             gains = [gain(a.errors, b.errors) for a, b in zip(loops, these, strict=True)]
@@ -256,20 +282,31 @@ def summary(measured: Sequence[Measured]) -> list[Summary]:
 
 
 def validate(
-    folder: Path, model: Path | None, most: int | None, processes: int = 1
+    folder: Path,
+    model: Path | None,
+    most: int | None,
+    processes: int = 1,
+    *,
+    polygons: bool = False,
 ) -> list[Measured]:
-    """Measure all methods on validation meshes; a model file stands for the bundled default."""
-    drawn = sorted(validation_meshes(folder, most), key=lambda each: each.path)
+    """Measure all methods on validation meshes; a model file stands for the bundled default.
+
+    With `polygons` shapes are remeshed in quads, and Catmull–Clark is what others improve on.
+    """
+    makers = REMESHERS if polygons else SIMPLIFIERS
+    drawn = sorted(validation_meshes(folder, most, makers), key=lambda each: each.path)
     shapes = [list(group) for _, group in groupby(drawn, key=lambda each: each.path)]
+    measure = partial(_of_shape, model=model, polygons=polygons)
     if processes == 1:
-        return [row for shape in shapes for row in _of_shape(shape, model)]
+        return [row for shape in shapes for row in measure(shape)]
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        rows = pool.map(_of_shape, shapes, [model] * len(shapes))
-        return [row for of_shape in rows for row in of_shape]
+        return [row for of_shape in pool.map(measure, shapes) for row in of_shape]
 
 
-def _of_shape(drawn: Sequence[Drawn], model: Path | None) -> list[Measured]:
-    return measured(drawn, contenders(load_model() if model is None else load_model(model)))
+def _of_shape(drawn: Sequence[Drawn], model: Path | None, *, polygons: bool) -> list[Measured]:
+    default = COMPANIONS[DEFAULT_MODEL] if polygons else None
+    loaded = load_model(model or default)
+    return measured(drawn, polygon_contenders(loaded) if polygons else contenders(loaded))
 
 
 def validate_command(
@@ -277,9 +314,13 @@ def validate_command(
     model: Annotated[Path | None, typer.Option(help="Model file; the default if none.")] = None,
     meshes: Annotated[int | None, typer.Option(help="At most so many meshes.")] = None,
     processes: Annotated[int, typer.Option(min=1, help="Shapes at once.")] = 2,
+    polygons: Annotated[
+        bool, typer.Option("--polygons", help="Quads over Catmull–Clark, by the model for them.")
+    ] = False,
 ) -> None:
     """Print the validation table of a model."""
-    made = table("validation", "", Summary, summary(validate(assets, model, meshes, processes)))
+    rows = validate(assets, model, meshes, processes, polygons=polygons)
+    made = table("validation", "", Summary, summary(rows))
     console = Console(width=200)
     for cells in ([each.heading for each in made.columns], *made.rows):
         texts = [

@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 
 from pns_common import pns
-from train.ablations.variants import PNS, Variant, fit_variant
 from train.data.datasets import DATASETS, Dataset
 from train.experiments.harness.sources import code_of, sources_of
+from train.experiments.harness.variants import PNS, Variant, fit_variant
 from train.fitting.determinism import machine_fingerprint
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
@@ -104,5 +104,5 @@ class Laboratory:
 def _digest(recipe: Recipe, variant: Variant) -> str:
     """Return a short hash of what decides the weights: the recipe, the rule, the code."""
     parts = [msgspec.json.encode(recipe), variant.name.encode()]
-    parts += [code_of(path) for path in sources_of("train.ablations.variants")]
+    parts += [code_of(path) for path in sources_of("train.experiments.harness.variants")]
     return hashlib.sha256(b"\n".join(parts)).hexdigest()[:12]

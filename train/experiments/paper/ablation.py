@@ -7,10 +7,10 @@ from types import MappingProxyType
 import numpy as np
 
 from pns_common import Mesh, pns
-from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.data.datasets import Dataset, grid_faces, jittered_grid
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.variants import VARIANTS, variant_method, variant_recipe
 from train.experiments.paper.methods import PAPER_UNITS, largest_ratio, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
 from train.metrics.card import compare_with_loop

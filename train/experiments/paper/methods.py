@@ -7,14 +7,13 @@ from typing import cast
 import msgspec
 
 from pns_common import Mesh, loop
-from train.ablations.variants import UNCONSTRAINED, variant_method, variant_recipe
 from train.baselines.butterfly import modified_butterfly
-from train.baselines.curvature_adaptive import curvature_adaptive
-from train.baselines.normal_displacement import fit_scalar, normal_displacement
+from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
 from train.baselines.pn_triangles import pn_triangles
 from train.baselines.quadric import quadric_fit
 from train.data.datasets import Dataset, Instance, ridge_held_out
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.variants import UNCONSTRAINED, variant_method, variant_recipe
 from train.experiments.paper.paper_values import PAPER_INSTANCE
 from train.models.recipe import Recipe, one_step
 from train.models.recipes import paper

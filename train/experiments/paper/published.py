@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from pns_common import pns
-from train.ablations.variants import (
+from train.experiments.harness.experiment import Experiment, Outcome, column, table
+from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.variants import (
     UNCONSTRAINED,
     WITHOUT_BOUND,
     WITHOUT_GATE,
@@ -12,8 +14,6 @@ from train.ablations.variants import (
     Variant,
     variant_method,
 )
-from train.experiments.harness.experiment import Experiment, Outcome, column, table
-from train.experiments.harness.laboratory import Laboratory
 from train.experiments.paper.ablation import architecture_numbers
 from train.experiments.paper.paper_values import (
     PUBLISHED_ABLATION,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from train.ablations.variants import VARIANTS, variant_method, variant_recipe
 from train.certificates.adversary import (
     Attack,
     affine_attack,
@@ -27,6 +26,7 @@ from train.experiments.harness.experiment import (
     table,
 )
 from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.variants import VARIANTS, variant_method, variant_recipe
 from train.experiments.paper.ablation import REMOVED_TITLES
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network

@@ -15,7 +15,7 @@ MODEL = load_model()
 
 def corners(name, levels, *meshes, model=MODEL, **options):
     """An attribute at the corners of all faces of a file's first mesh."""
-    options = Options(levels=levels, **{"diagnostics": "full", **options})
+    options = Options(levels=levels, **{"diagnostics": "full", "polygons": "off", **options})
     made = subdivide_gltf(files.glb(*meshes), "glb", options, model, Limits())
     faces, attributes = files.primitive_of(made.glb)
     return attributes[name][faces]

@@ -1,14 +1,12 @@
-"""Normal displacement: Loop's edge vertex pushed along the mean face normal by one fitted scalar.
+"""The paper's baselines that place edge vertices: a blend with Butterfly, and a fitted push."""
 
-q = q0 + s h N, h the edge's length. In the spirit of Boubekeur and Alexa 2008 (Phong tessellation);
-the paper names this baseline and gives no formula. The push scales with the mesh, so that s does
-not depend on the unit of length.
-"""
+from dataclasses import replace
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from train.baselines.butterfly import butterfly_edge_vertices
 from train.baselines.placement import placed_edges
 from train.connectivity import Connectivity, connect
 from train.data.datasets import Dataset
@@ -19,8 +17,32 @@ from train.surfaces.implicit import signed_distance, unit_normal
 from train.tensors import dot
 
 
+def curvature_adaptive(gate_sharpness: float) -> Method:
+    """Return Loop where the mesh is flat, Butterfly where it bends.
+
+    q = (1 − γ) Loop + γ Butterfly with the operator's own gate γ = tanh(c x²); old vertices,
+    boundary and irregular edges are Loop's. Source: paper, Setup, baselines, and metrics.
+    """
+
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        around = Surroundings(mesh, points)
+        frames = edge_frames(read_edges(around, first_face=True), first_face=True)
+        gate = torch.where(mesh.paired, torch.tanh(gate_sharpness * frames.curvature**2), 0.0)
+        loop = loop_mask(mesh)(points)[mesh.vertex_count :]
+        edges = loop + gate[:, None] * (butterfly_edge_vertices(points, mesh) - loop)
+        placed = placed_edges(points, mesh, reference_length, edges)
+        return replace(placed, gate=torch.cat([points.new_zeros(len(points)), gate]))
+
+    return Method("curvature-adaptive", step)
+
+
 def normal_displacement(scalar: float) -> Method:
-    """Return the method with a fitted scalar; boundary and irregular edges are Loop's."""
+    """Return Loop's edge vertex pushed along the mean face normal by one fitted scalar.
+
+    q = q0 + s h N, h the edge's length, so that s has no unit; boundary and irregular edges are
+    Loop's. In the spirit of Boubekeur and Alexa 2008 (Phong tessellation); the paper names this
+    baseline and gives no formula.
+    """
 
     def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
         loop = loop_mask(mesh)(points)[mesh.vertex_count :]

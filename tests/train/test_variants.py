@@ -9,9 +9,7 @@ from hypothesis import given, settings
 
 from pns_common import Mesh, loop, pns
 from tests.support.meshes import bent, bumpy_sphere, grid, rotation, soups
-from tests.support.recipes import tiny
-from train.ablations.feature_groups import choices, features_method, fit_features
-from train.ablations.variants import (
+from train.experiments.harness.variants import (
     PNS,
     UNCONSTRAINED,
     VARIANTS,
@@ -107,17 +105,6 @@ def test_every_variant_refines_any_mesh_over_and_over(variant, mesh):
     recipe = variant_recipe(paper(), variant)
     method = variant_method(variant, initial_network(recipe), recipe)
     assert np.isfinite(refine(mesh, method, 2).mesh.vertices).all()
-
-
-def test_every_choice_of_features_is_trained_and_refines():
-    recipe, mesh = tiny(paper(), 1), Mesh(*grid(5, bent))
-    counts = []
-    for choice in choices():
-        network = fit_features(recipe, choice, _quiet)
-        refined = refine(mesh, features_method(recipe, choice, network), 1, 1.0)
-        assert refined.ratio.max() <= 1 + 1e-12
-        counts.append(len(choice.features))
-    assert counts == [18, 17, 14, 14, 14, 5, 6, 9, 9, 9]
 
 
 def _quiet(done, loss):

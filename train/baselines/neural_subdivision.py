@@ -1,0 +1,181 @@
+"""Neural Subdivision's form: three networks on half-flaps say where vertices go, without a bound.
+
+Source: Liu, Kim, Chaudhuri, Aigerman, Jacobson 2020, Neural Subdivision. A half-flap is a half-edge
+i → j with the vertices k, l across its two faces, in a frame of its own; I makes features of the
+vertices, V moves old vertices, E places new ones from the middle of their edge, each by the mean
+over half-flaps. Other than in the source, lengths count in those of the half-edge, so that scale
+does not matter; I makes the features anew at each level; and vertices at a boundary stay.
+
+``python -m train.baselines.neural_subdivision`` trains the networks on the stream of the default
+model, by its loss, and writes them beside this file.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import safetensors.torch
+import scipy.sparse as sparse
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from pns_common.files import replace_file
+from train.baselines.placement import midpoints, placed_edges
+from train.connectivity import Connectivity, connect, next_corner
+from train.fitting.determinism import deterministic
+from train.fitting.limit_batch import LimitBatch
+from train.fitting.limit_loss import LimitMeasures, limit_loss, measure
+from train.fitting.limit_trainer import batches
+from train.models.networks import perceptron
+from train.models.recipe import Recipe, ToLimit
+from train.reference import Step
+from train.refining import Method, loop_rule
+from train.tensors import dot, root, unit
+
+WEIGHTS = Path(__file__).with_suffix(".safetensors")
+# Features of a vertex, widths of the hidden layers, and coordinates of j, k and l.
+FEATURES, HIDDEN, COORDINATES = 32, (32, 32), 9
+# As in the source, the networks act at two levels.
+LEVELS = 2
+# Batches whose connectivity is kept; each comes back many times.
+KEPT = 128
+STEPS, LEARNING_RATE, LONGEST_GRADIENT = 2000, 2e-3, 1.0
+
+
+class HalfFlapNets(nn.Module):
+    """The networks I, V and E."""
+
+    def __init__(self, generator: torch.Generator):
+        super().__init__()
+        read = COORDINATES + 4 * FEATURES
+
+        def network(given: int, made: int) -> nn.Sequential:
+            return perceptron((given, *HIDDEN, made), "silu", generator)
+
+        self.start = network(COORDINATES, FEATURES)
+        self.vertex, self.edge = network(read, 3 + FEATURES), network(read, 3)
+
+    def placed(
+        self, points: Float[Tensor, "V 3"], mesh: Connectivity
+    ) -> tuple[Float[Tensor, "V 3"], Float[Tensor, "E 3"]]:
+        """Return old vertices, and one vertex for each edge."""
+        here = mesh.half_edges[mesh.paired].T.reshape(-1)
+        corners, across = mesh.faces.reshape(-1), mesh.twins[here]
+        ends = [here, next_corner(here), *(next_corner(next_corner(h)) for h in (here, across))]
+        i, j, k, beyond = (corners[corner] for corner in ends)
+        arms = torch.stack([points[to] - points[i] for to in (j, k, beyond)], dim=1)
+        length = root(dot(arms[:, 0], arms[:, 0]))
+        along, own = unit(arms[:, 0]), torch.linalg.cross(arms[:, 0], arms[:, 1])
+        other = torch.linalg.cross(arms[:, 2], arms[:, 0])
+        normal = unit(unit(own) + unit(other))
+        frame = torch.stack([along, torch.linalg.cross(normal, along), normal], dim=1)
+        seen = unit_lengths(arms, length) @ frame.transpose(1, 2)
+        flaps = seen.reshape(len(seen), COORDINATES).float()
+
+        def mean(values: Float[Tensor, "H K"]) -> Float[Tensor, "V K"]:
+            sums = values.new_zeros(len(points), values.shape[1]).index_add(0, i, values)
+            counts = torch.bincount(i, minlength=len(points)).clamp(min=1)
+            return sums / counts[:, None]
+
+        def asked(network: nn.Module, features: Float[Tensor, "V K"]) -> Float[Tensor, "H A"]:
+            around = [features[at] for at in (i, j, k, beyond)]
+            return network(torch.cat([flaps, *around], dim=1))
+
+        def moved(answers: Float[Tensor, "H A"]) -> Float[Tensor, "H 3"]:
+            local = (length[:, None] * answers[:, :3]).double()
+            return (local[:, None] @ frame)[:, 0]
+
+        of_vertices = asked(self.vertex, mean(self.start(flaps)))
+        free = mesh.ringed[:, None]
+        vertices = points + torch.where(free, mean(moved(of_vertices)), 0.0)
+        pairs = moved(asked(self.edge, mean(of_vertices[:, 3:]))).reshape(2, -1, 3)
+        edges = midpoints(points, mesh)
+        paired = torch.nonzero(mesh.paired)[:, 0]
+        return vertices, edges.index_add(0, paired, pairs.mean(dim=0))
+
+
+def unit_lengths(
+    arms: Float[Tensor, "H 3 3"], length: Float[Tensor, " H"]
+) -> Float[Tensor, "H 3 3"]:
+    """Return arms in lengths of the half-edge; 0 where it has none."""
+    positive = (length > 0)[:, None, None]
+    return torch.where(positive, arms / torch.where(positive, length[:, None, None], 1.0), 0.0)
+
+
+def neural_subdivision(networks: HalfFlapNets | None = None) -> Method:
+    """Return the method, by the networks that are kept beside this file unless others are given."""
+    kept = networks or load_networks()
+
+    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
+        if not mesh.paired.any():
+            return loop_rule(points, mesh, reference_length)
+        vertices, edges = kept.placed(points, mesh)
+        return placed_edges(points, mesh, reference_length, edges, vertices)
+
+    return Method("neural-subdivision", step, learned_levels=LEVELS)
+
+
+def load_networks() -> HalfFlapNets:
+    """Return the trained networks."""
+    networks = HalfFlapNets(torch.Generator())
+    networks.load_state_dict(safetensors.torch.load(WEIGHTS.read_bytes()))
+    return networks
+
+
+def fit_networks(
+    recipe: Recipe, plan: ToLimit, steps: int, on_step: Callable[[int, float], None]
+) -> HalfFlapNets:
+    """Train on the meshes of a recipe's stream, by its loss, on the points after two levels."""
+    with deterministic():
+        networks = HalfFlapNets(torch.Generator().manual_seed(recipe.seed))
+        optimiser = torch.optim.Adam(networks.parameters(), lr=LEARNING_RATE)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=steps)
+        for done, (batch, reference) in enumerate(batches(replace(recipe, steps=steps), plan), 1):
+            loss = limit_loss(plan.weights, _measured(batch, networks), reference)
+            optimiser.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(networks.parameters(), LONGEST_GRADIENT)
+            optimiser.step()
+            schedule.step()
+            on_step(done, loss.item())
+    return networks
+
+
+def _measured(batch: LimitBatch, networks: HalfFlapNets) -> LimitMeasures:
+    points = batch.level.points
+    for mesh in _levels(batch):
+        points = torch.cat(networks.placed(points, mesh))
+    as_they_are = sparse.csr_array(sparse.eye_array(len(points)))
+    return measure(replace(batch, limit=as_they_are), points)
+
+
+@lru_cache(KEPT)
+def _levels(batch: LimitBatch) -> list[Connectivity]:
+    """Return the meshes at which the networks act."""
+    topology = batch.level.level.topology
+    levels = [connect(topology.corners.reshape(-1, 3), topology.vertex_count)]
+    for _ in range(LEVELS - 1):
+        last = levels[-1]
+        levels.append(connect(last.split().numpy(), last.vertex_count + len(last.edges)))
+    return levels
+
+
+def main() -> None:
+    """Train the networks and write them."""
+    from train.models.recipes import general
+
+    recipe = general()
+    assert isinstance(recipe.training, ToLimit)
+
+    def told(done: int, loss: float) -> None:
+        if done % 100 == 0:
+            print(f"{done} of {STEPS}: {loss:.3f}", flush=True)
+
+    networks = fit_networks(recipe, recipe.training, STEPS, told)
+    replace_file(WEIGHTS, safetensors.torch.save(networks.state_dict()))
+
+
+if __name__ == "__main__":
+    main()
