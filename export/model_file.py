@@ -102,6 +102,7 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     for name in ("sharpness", "face"):
         if recipe[name] is not None:
             on_card[f"{name}_features"] = recipe[name].pop("features")
+            recipe[name] = {key: what for key, what in recipe[name].items() if what is not None}
     if form is not None:
         on_card |= recipe.pop("scale_free")
     # One level of names: how it was trained stands beside the rest.

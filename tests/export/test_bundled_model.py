@@ -32,7 +32,7 @@ each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
 
 
 def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
-    assert sorted(BY_MODEL) == bundled_models()
+    assert sorted(BY_MODEL) == bundled_models(companions=True)
     assert DEFAULT_MODEL in BY_MODEL
 
 
@@ -130,7 +130,17 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
     assert files[0] == files[1]
 
 
-@each_model
+# The batches of this one were drawn beforehand, as its card says: `make models` trains it again.
+DRAWN_BEFORE = pytest.mark.xfail(strict=True, reason="trained on batches drawn beforehand")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[DRAWN_BEFORE] if name == "general-quad" else [])
+        for name in sorted(BY_MODEL)
+    ],
+)
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
     recipe = recipe_on_card(training)
