@@ -97,7 +97,6 @@ models: $(DEV)/.ready
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
 	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
 	done
-	$(DEV)/bin/python export/run.py --prior-alone
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
 SOAK ?= --minutes 10
