@@ -51,7 +51,7 @@ class Options:
     weld: WeldRule = "position"
     weld_tolerance: float = 0.0
     border: BorderRule = "smooth"
-    polygons: PolygonRule = "auto"
+    polygons: PolygonRule = "off"
     material: str | None = None
     group: str | None = None
     compress: Compression = "none"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
@@ -247,8 +248,20 @@ def _target(
     return refined
 
 
+class Blending(Protocol):
+    """A split that carries values of its rows to the refined ones."""
+
+    def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
+        """Return blends."""
+        ...
+
+    def nearest(self, values: Shaped[np.ndarray, "C K"]) -> Shaped[np.ndarray, "N K"]:
+        """Return values of nearest rows."""
+        ...
+
+
 def blend(
-    name: str, own: SplitConnectivity, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
+    name: str, own: Blending, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
 ) -> Shaped[np.ndarray, "N K"]:
     """Return linear blends; of identifiers and other whole numbers, values of nearest corners."""
     fraction = accessor.normalized or name.startswith("COLOR_")

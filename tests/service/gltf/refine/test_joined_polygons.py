@@ -34,7 +34,7 @@ def subdivide(*primitives, edit=None, model=None, **options):
         tree, binary = files.unpack(data)
         edit(tree)
         data = files.pack(tree, binary)
-    options = Options(**{"scheme": "catmull-clark", "levels": 2, **options})
+    options = Options(**{"scheme": "catmull-clark", "levels": 2, "polygons": "auto", **options})
     return subdivide_gltf(data, "glb", options, model, Limits())
 
 
@@ -68,7 +68,7 @@ def test_off_refines_triangles_as_they_are():
     )
 
 
-def test_the_default_joins_a_file_of_quads_and_leaves_one_of_triangles():
+def test_auto_joins_a_file_of_quads_and_leaves_one_of_triangles():
     model = load_model()
     for shape, name in ((cube(), "general-quad"), (octahedron(), "general")):
         made = subdivide(shape, scheme="auto", model=model)
