@@ -229,7 +229,9 @@ def batch(
 @app.command()
 def serve(
     host: Annotated[str | None, typer.Option(help="default: PNS_HOST, else 127.0.0.1")] = None,
-    port: Annotated[int | None, typer.Option(help="default: PNS_PORT, else 8000")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="default: PNS_PORT, else 8000")
+    ] = None,
     model: Annotated[
         str | None,
         typer.Option(

@@ -44,7 +44,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
     "weld": {"weld": "off"},
     "weld_tolerance": {"weld_tolerance": 0.001},
     "border": {"border": "fixed"},
-    "polygons": {"polygons": "off"},
+    "polygons": {"polygons": "auto"},
     "material": {"material": "a"},
     "group": {"group": "b"},
     "compress": {"compress": "draco"},
