@@ -130,17 +130,7 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
     assert files[0] == files[1]
 
 
-# The batches of this one were drawn beforehand, as its card says: `make models` trains it again.
-DRAWN_BEFORE = pytest.mark.xfail(strict=True, reason="trained on batches drawn beforehand")
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[DRAWN_BEFORE] if name == "general-quad" else [])
-        for name in sorted(BY_MODEL)
-    ],
-)
+@each_model
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
     recipe = recipe_on_card(training)
