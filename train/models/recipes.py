@@ -129,7 +129,10 @@ def general(seed: int = 0) -> Recipe:
 def general_quad(seed: int = 0) -> Recipe:
     """Return the recipe for meshes of polygons: `general` over Catmull–Clark, with its sharpness.
 
-    Sharpness trained on quads alone found fewer sharp edges of parts than that of triangles does.
+    No step is taken: its corrections stay at zero, which leaves the prior. In 1,200 steps they gain
+    four points in mean distance on remeshed organic shapes, and swell what is drawn with few faces:
+    the walls of a drum of twelve sides by a tenth, the sides of a cube by a fiftieth. Sharpness
+    trained on quads alone found fewer sharp edges of parts than that of triangles does.
     """
     base = general(seed)
     assert base.scale_free is not None
@@ -148,7 +151,7 @@ def general_quad(seed: int = 0) -> Recipe:
             reuse=16,
             start=0,
         ),
-        steps=1200,
+        steps=0,
         sharpness=replace(base.sharpness, of_model="general"),
         face=NetworkShape("face-8", hidden=(32, 32)),
     )
