@@ -4,9 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pns_common import ModelError
+from pns_common import Mesh, ModelError, subdivide
 from pns_common.model import file as model_file
 from pns_common.model.file import (
     BUNDLED,
@@ -16,6 +17,7 @@ from pns_common.model.file import (
     load_model,
     write_manifest,
 )
+from tests.support.polygons import cylinder
 
 
 @pytest.fixture
@@ -110,3 +112,13 @@ def test_models_load_and_answer_without_anything_of_training():
         assert load_model().vertex_correction(np.ones((7, 10)), 1.0).shape == (7, 3)
     """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_drum_of_twelve_sides_is_round_and_a_box_of_quads_a_box():
+    made = subdivide(Mesh(*cylinder(12, height=2.0))).vertices
+    walls = made[(made[:, 2] > 0.1) & (made[:, 2] < 1.9)]
+    np.testing.assert_allclose(np.hypot(walls[:, 0], walls[:, 1]), 1, atol=0.01)
+    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)]) - 0.5
+    sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    box = subdivide(Mesh(corners, sides)).vertices
+    np.testing.assert_allclose(np.abs(box).max(axis=1), 0.5, atol=0.005)
