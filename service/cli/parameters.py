@@ -74,7 +74,6 @@ DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carrie
 UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
 NormalsOption = Annotated[
     NormalRule,
-    PolygonRule,
     typer.Option(
         help="auto: those of the file; where a mesh has none, smooth but across sharp edges. "
         "keep: none where there are none. smooth: new ones for every mesh. limit: those of the "

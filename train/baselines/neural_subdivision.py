@@ -27,12 +27,12 @@ from train.connectivity import Connectivity, connect, next_corner
 from train.fitting.determinism import deterministic
 from train.fitting.limit_batch import LimitBatch
 from train.fitting.limit_loss import LimitMeasures, limit_loss, measure
-from train.fitting.limit_trainer import batches
+from train.fitting.limit_trainer import LONGEST_GRADIENT, batches
 from train.models.networks import perceptron
 from train.models.recipe import Recipe, ToLimit
 from train.reference import Step
 from train.refining import Method, loop_rule
-from train.tensors import dot, root, unit
+from train.tensors import dot, ratio, root, unit
 
 WEIGHTS = Path(__file__).with_suffix(".safetensors")
 # Features of a vertex, widths of the hidden layers, and coordinates of j, k and l.
@@ -41,7 +41,7 @@ FEATURES, HIDDEN, COORDINATES = 32, (32, 32), 9
 LEVELS = 2
 # Batches whose connectivity is kept; each comes back many times.
 KEPT = 128
-STEPS, LEARNING_RATE, LONGEST_GRADIENT = 2000, 2e-3, 1.0
+STEPS, LEARNING_RATE = 2000, 2e-3
 
 
 class HalfFlapNets(nn.Module):
@@ -71,7 +71,7 @@ class HalfFlapNets(nn.Module):
         other = torch.linalg.cross(arms[:, 2], arms[:, 0])
         normal = unit(unit(own) + unit(other))
         frame = torch.stack([along, torch.linalg.cross(normal, along), normal], dim=1)
-        seen = unit_lengths(arms, length) @ frame.transpose(1, 2)
+        seen = ratio(arms, length[:, None, None]) @ frame.transpose(1, 2)
         flaps = seen.reshape(len(seen), COORDINATES).float()
 
         def mean(values: Float[Tensor, "H K"]) -> Float[Tensor, "V K"]:
@@ -94,14 +94,6 @@ class HalfFlapNets(nn.Module):
         edges = midpoints(points, mesh)
         paired = torch.nonzero(mesh.paired)[:, 0]
         return vertices, edges.index_add(0, paired, pairs.mean(dim=0))
-
-
-def unit_lengths(
-    arms: Float[Tensor, "H 3 3"], length: Float[Tensor, " H"]
-) -> Float[Tensor, "H 3 3"]:
-    """Return arms in lengths of the half-edge; 0 where it has none."""
-    positive = (length > 0)[:, None, None]
-    return torch.where(positive, arms / torch.where(positive, length[:, None, None], 1.0), 0.0)
 
 
 def neural_subdivision(networks: HalfFlapNets | None = None) -> Method:

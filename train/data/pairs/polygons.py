@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pns_common import Mesh, MeshError, catmull_clark, refine
+from pns_common.kernels.connectivity import pair_up
 from pns_common.topology import EdgeClass
 from train.connectivity import connect, next_corner
 from train.data.pairs.faceted import block, faceted_pair
@@ -138,14 +139,11 @@ def in_polygons(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     turns = np.cross(before, sides) @ unit(normals.sum(axis=1))[:, :, None]
     skewed = np.abs((before * sides).sum(axis=2)).max(axis=1)
     bent = 1 - dot(normals[:, 0], normals[:, 1])
-    joined: list[np.ndarray] = list(parts)
     fair = np.flatnonzero((skewed < SKEWED) & (turns[..., 0] > 0).all(axis=1) & (bent < 1))
-    for row in fair[np.argsort(skewed[fair] + bent[fair], kind="stable")]:
-        first, second = corners[row] // 3
-        if free[first] and free[second]:
-            free[[first, second]] = False
-            joined.append(quads[row])
-    return Mesh(points, [*joined, *mesh.faces[free]])
+    rows = fair[np.argsort(skewed[fair] + bent[fair], kind="stable")]
+    chosen = np.zeros(len(rows), dtype=bool)
+    pair_up(*(corners[rows] // 3).T, free, chosen)
+    return Mesh(points, [*parts, *quads[rows[chosen]], *mesh.faces[free]])
 
 
 def _flat_parts(mesh: Mesh) -> tuple[list[np.ndarray], np.ndarray]:
