@@ -102,15 +102,11 @@ def of_service_error(error: ServiceError) -> JSONResponse:
     return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
 
 
-def of_job(error: Exception) -> JSONResponse:
-    """Return the document of the error that a job ended with."""
-    return of_service_error(error) if isinstance(error, ServiceError) else internal_error()
-
-
 def of_job_view(error: Exception, request_id: str | None) -> dict[str, Any]:
     """Return the document as a part of a job; `request_id` is that of the request that made it."""
     # The log has what it says of the job under that id.
-    return json.loads(bytes(of_job(error).body)) | {"request_id": request_id}
+    answer = of_service_error(error) if isinstance(error, ServiceError) else internal_error()
+    return json.loads(bytes(answer.body)) | {"request_id": request_id}
 
 
 def _of_validation_error(error: RequestValidationError) -> JSONResponse:

@@ -132,21 +132,18 @@ async def _delete(service: Service, request: Request, job_id: str) -> None:
 async def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
     """Answer with a file of a job, or the problem that it failed with. Raises ServiceError."""
     client = client_of(request, service.settings).id
+    view = await _view(service, request, job_id)
+    if view["state"] == State.FAILED and view["problem"] is not None:
+        problem = view["problem"]
+        # What failed a while ago for want of room may find some.
+        headers = {"Retry-After": "1"} if problem["status"] == 503 else None
+        return problems.ProblemResponse(problem, problem["status"], headers)
+    _check_done(view["state"])
     sent, timing = (lambda: None), {}
     if service.shared is not None and not service.book.has(job_id):
-        view = (await service.shared.find(job_id, client)).view
-        if view["state"] == State.FAILED and view["problem"] is not None:
-            problem = view["problem"]
-            # What failed a while ago for want of room may find some.
-            headers = {"Retry-After": "1"} if problem["status"] == 503 else None
-            return problems.ProblemResponse(problem, problem["status"], headers)
-        _check_done(view["state"])
         file = await service.shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
     else:
         job = service.book.find(job_id, client).job
-        if job.state is State.FAILED and job.error is not None:
-            return problems.of_job(job.error)
-        _check_done(job.state)
         answer, report = job.results
         file = report if kind == media.JSON else answer
         file.hold()
