@@ -329,14 +329,17 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
 
 
 def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None:
-    """Return the longest way from the smooth rules to the new vertices of creases; None without."""
-    mesh, rows = level.topology, level.topology.crease_edges
-    soft = np.flatnonzero(mesh.soft)
-    if len(rows) == 0 and len(soft) == 0:
+    """Return the longest way from the smooth rules to new vertices of creases and to corners.
+
+    None without any.
+    """
+    mesh = level.topology
+    rows = np.concatenate([mesh.crease_edges, np.flatnonzero(mesh.soft)])
+    corners = np.flatnonzero(mesh.vertex_sharpness)
+    if len(rows) == 0 and len(corners) == 0:
         return None
-    rows = np.concatenate([rows, soft])
     smooth = level.base.place(level.points, mesh.without_creases(), level.blocks.quiet())
-    vertices = np.unique(mesh.edges[rows])
+    vertices = np.unique(np.concatenate([mesh.edges[rows].reshape(-1), corners]))
     at = np.concatenate([vertices.astype(np.int64), mesh.vertex_count + rows])
     return longest(placed[at] - smooth[at])
 

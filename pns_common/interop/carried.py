@@ -14,7 +14,7 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
-from pns_common.creases import Creases, as_pairs
+from pns_common.creases import Creases, check_vertices
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks
@@ -72,9 +72,7 @@ def refine_carried(
     if weld == "position":
         joined, first = join_by_position(given.vertices)
     creases = options.get("creases", "auto")
-    if isinstance(creases, Creases) and creases.named is not None:
-        options["creases"] = replace(creases, named=_renamed(creases.named, joined))
-    elif creases is not None and not isinstance(creases, str | Creases):
+    if creases is not None and not isinstance(creases, str):
         options["creases"] = _renamed(creases, joined)
     surface_faces = joined[given.corners], given.offsets
     refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
@@ -107,19 +105,25 @@ def refine_carried(
     return CarriedMesh(positions, faces, points, corners, cells), refinement
 
 
-def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Integer[np.ndarray, "N 2"]:
+def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Creases:
     """Return creases by the joined vertices.
 
     Raises:
-        ParameterError: they are not pairs of the mesh's vertices.
+        ParameterError: they are not pairs of the mesh's vertices, or name others as corners.
     """
-    pairs, count = as_pairs(creases), len(joined)
+    made, count = creases if isinstance(creases, Creases) else Creases(creases), len(joined)
+    if made.vertices is not None:
+        check_vertices(made.vertices, count)
+        made = replace(made, vertices=joined[made.vertices])
+    if made.named is None:
+        return made
+    pairs = made.named
     outside = np.flatnonzero(((pairs < 0) | (pairs >= count)).any(axis=1))
     if len(outside):
         row = int(outside[0])
         expected = f"vertices 0 … {count - 1}"
         raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
-    return joined[pairs]
+    return replace(made, named=joined[pairs])
 
 
 def join_by_position(
