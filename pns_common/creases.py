@@ -13,7 +13,7 @@ from pns_common.kernels import measures
 from pns_common.normals import measure_faces
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import MOSTLY_SHARP, Topology
+from pns_common.topology import MOSTLY_SHARP, Topology, check_vertices
 
 HALF_TURN = 180
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
@@ -132,7 +132,7 @@ class Creases:
         """
         topology = topology.with_border(self.border)
         if self.vertices is not None and len(self.vertices):
-            check_vertices(self.vertices, topology.vertex_count)
+            check_vertices("vertices", self.vertices, topology.vertex_count)
             sharpness = np.zeros(topology.vertex_count)
             given = self.vertex_sharpness
             if given is None:
@@ -237,15 +237,6 @@ def as_vertices(given: Any) -> Integer[np.ndarray, " M"]:
         expected = "(M,) whole numbers of vertices"
         raise ParameterError("vertices", f"{values.dtype} {values.shape}", expected=expected)
     return values.astype(np.int64)
-
-
-def check_vertices(vertices: Integer[np.ndarray, " M"], count: int) -> None:
-    """Raise ParameterError unless a mesh of so many vertices has all of these."""
-    outside = np.flatnonzero((vertices < 0) | (vertices >= count))
-    if len(outside):
-        row = int(outside[0])
-        expected = f"a vertex 0 … {count - 1}"
-        raise ParameterError(f"vertices[{row}]", int(vertices[row]), expected=expected)
 
 
 def _check_numbers(

@@ -274,11 +274,7 @@ class Topology:
         Raises:
             ParameterError: a pair is no edge; ``name`` is the argument's.
         """
-        outside = np.flatnonzero(((pairs < 0) | (pairs >= self.vertex_count)).any(axis=1))
-        if len(outside):
-            row = int(outside[0])
-            expected = f"vertices 0 … {self.vertex_count - 1}"
-            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected=expected)
+        check_vertices(name, pairs, self.vertex_count)
         named = np.zeros(self.vertex_count, dtype=bool)
         named[pairs.reshape(-1)] = True
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
@@ -431,6 +427,14 @@ def halves_of(parent: Topology, rows: Integer[np.ndarray, " N"]) -> Integer[np.n
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
+
+
+def check_vertices(name: str, given: Integer[np.ndarray, " N *K"], count: int) -> None:
+    """Raise ParameterError where an argument names a vertex that is not there."""
+    outside = np.argwhere((given < 0) | (given >= count))
+    if len(outside):
+        row, expected = int(outside[0, 0]), f"vertices 0 … {count - 1}"
+        raise ParameterError(f"{name}[{row}]", given[row].tolist(), expected=expected)
 
 
 Numbered = tuple[

@@ -14,14 +14,14 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
-from pns_common.creases import Creases, check_vertices
+from pns_common.creases import Creases
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks
 from pns_common.refinement import Refinement, refine
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
-from pns_common.topology import Topology
+from pns_common.topology import Topology, check_vertices
 
 # The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
 CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
@@ -113,17 +113,12 @@ def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Creases:
     """
     made, count = creases if isinstance(creases, Creases) else Creases(creases), len(joined)
     if made.vertices is not None:
-        check_vertices(made.vertices, count)
+        check_vertices("vertices", made.vertices, count)
         made = replace(made, vertices=joined[made.vertices])
     if made.named is None:
         return made
-    pairs = made.named
-    outside = np.flatnonzero(((pairs < 0) | (pairs >= count)).any(axis=1))
-    if len(outside):
-        row = int(outside[0])
-        expected = f"vertices 0 … {count - 1}"
-        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
-    return replace(made, named=joined[pairs])
+    check_vertices("creases", made.named, count)
+    return replace(made, named=joined[made.named])
 
 
 def join_by_position(
