@@ -78,7 +78,7 @@ def select(
         refined: all refined faces, triangles or quads, of ``count`` vertices.
         count, levels: how many vertices these have, and how often faces were split.
     """
-    degree, each, every = refined.shape[1], 4**levels, np.arange(len(mesh.corners))
+    degree, each, every = refined.shape[1], int(4**levels), np.arange(len(mesh.corners))
     picked, followed = chosen[mesh.face_of(every)], every + 1
     followed[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
     own, rest = np.flatnonzero(picked), np.flatnonzero(~picked)
