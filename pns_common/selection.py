@@ -17,7 +17,7 @@ from jaxtyping import Bool, Integer
 
 from pns_common.errors import ParameterError
 from pns_common.rows import marked
-from pns_common.topology import Topology
+from pns_common.topology import Topology, following
 
 SIDES = 3
 
@@ -79,11 +79,10 @@ def select(
         count, levels: how many vertices these have, and how often faces were split.
     """
     degree, each, every = refined.shape[1], int(4**levels), np.arange(len(mesh.corners))
-    picked, followed = chosen[mesh.face_of(every)], every + 1
-    followed[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
+    picked = chosen[mesh.face_of(every)]
     own, rest = np.flatnonzero(picked), np.flatnonzero(~picked)
     split = marked(mesh.corner_edges[own], len(mesh.edges))[mesh.corner_edges[rest]]
-    along = _along(rest, followed[rest], levels, degree)
+    along = _along(rest, following(mesh.offsets)[rest], levels, degree)
     if degree == SIDES:
         places, owner = _cut(along.reshape(-1, SIDES, 2**levels), split.reshape(-1, SIDES))
         owner = rest[SIDES * owner]

@@ -429,6 +429,13 @@ def halves_of(parent: Topology, rows: Integer[np.ndarray, " N"]) -> Integer[np.n
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
 
 
+def following(offsets: Integer[np.ndarray, " F1"]) -> Integer[np.ndarray, " H"]:
+    """Return the next corner of the same face, of each corner; ``offsets`` as of a topology."""
+    made = np.arange(1, offsets[-1] + 1, dtype=np.int64)
+    made[offsets[1:] - 1] = offsets[:-1]
+    return made
+
+
 def check_vertices(name: str, given: Integer[np.ndarray, " N *K"], count: int) -> None:
     """Raise ParameterError where an argument names a vertex that is not there."""
     outside = np.argwhere((given < 0) | (given >= count))
@@ -469,9 +476,7 @@ def _sort_edges(
     corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return what ``_number_edges`` does, by sorting: for vertices of thousands of edges."""
-    following = np.arange(1, len(corners) + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    pairs = np.stack([corners, corners[following]], axis=1)
+    pairs = np.stack([corners, corners[following(offsets)]], axis=1)
     keys = _keys(pairs, vertex_count)
     _, first, group, count = np.unique(
         keys, return_index=True, return_inverse=True, return_counts=True

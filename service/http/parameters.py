@@ -127,7 +127,8 @@ class Parameters(BaseModel):
     )
     material: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=DEFAULTS.material,
-        description="refine only the faces of this material; their neighbours are cut to meet them",
+        description="refine only the faces of this material; triangles beside them are cut, and "
+        "polygons get more corners",
     )
     group: Annotated[str | None, BeforeValidator(_empty_is_absent)] = Field(
         default=DEFAULTS.group,

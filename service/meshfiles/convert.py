@@ -290,14 +290,8 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
     flat = bool((mesh.sizes == 3).all())
     if options.scheme == "catmull-clark" or not flat:
         scheme = polygon_scheme(options, model)
-        wants = [name for name in ("material", "group") if getattr(options, name)]
-        if scheme is not None and not wants:
-            return mesh, scheme
-        if options.scheme == "catmull-clark":
-            raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
         if scheme is not None:
-            told = Change("", f"polygons cut into triangles, which {wants[0]} needs", 1)
-            mesh = replace(mesh, changes=(*mesh.changes, told))
+            return mesh, scheme
     return triangulated(mesh), None
 
 

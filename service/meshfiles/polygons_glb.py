@@ -25,6 +25,7 @@ from ..gltf.write.storage import (
 from ..options import Limits, Options
 from .mesh_file import MATERIAL, Labels, Layer, MeshFile
 from .to_gltf import as_gltf
+from .triangulate import triangulated
 
 # Which corners of a quad its two triangles have, by the corner that both begin with.
 FANS = np.array([[k, (k + 1) % 4, (k + 2) % 4, k, (k + 2) % 4, (k + 3) % 4] for k in range(4)])
@@ -37,12 +38,17 @@ def polygons_glb(
     limits: Limits,
     siblings: SiblingFiles,
 ) -> tuple[bytes, dict[str, Any]]:
-    """Write refined quads; return also the report, with what is lost.
+    """Write refined polygons; return also the report, with what is lost.
+
+    Quads are marked as such. Where others are among them, all are cut into triangles.
 
     Raises:
         UnrefinableError: a position that float32 cannot hold.
     """
-    sent = as_gltf(_as_triangles(mesh), siblings, options, ngons=True)
+    alike = bool((mesh.sizes == 4).all())
+    triangles = _as_triangles(mesh) if alike else triangulated(mesh)
+    every = replace(options, material=None, group=None)
+    sent = as_gltf(triangles, siblings, every, ngons=alike)
     upload = read_upload(sent.data, "glb", 0, limits, sent.siblings)
     writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
     # The first corner of a triangle counts.
@@ -55,7 +61,7 @@ def polygons_glb(
     changes = [*sent.losses, *upload.changes, *remove_replaced(writer, upload.spare)]
     changes += writer.changes()
     primitives = upload.tree["meshes"][0]["primitives"]
-    if options.compress == "draco":
+    if options.compress == "draco" and alike:
         # It orders triangles anew.
         changes += leave_out_ngons(upload.tree, 0, range(len(primitives)))
         withdraw_unused(upload.tree)
