@@ -131,7 +131,7 @@ def subdivide(
             metavar="FILE.npz",
             parser=local_path,
             help="write what each vertex of OUT is made of: weights of the vertices of IN, a row "
-            "each, as scipy.sparse.load_npz reads them (OBJ, PLY, STL, OFF)",
+            "each, as scipy.sparse.load_npz reads them; of a glTF for each primitive",
         ),
     ] = None,
     to: Annotated[

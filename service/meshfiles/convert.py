@@ -19,7 +19,6 @@ from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.kernels import ANNOUNCEMENT, are_compiled
-from pns_common.matrix import SubdivisionMatrix
 from pns_common.model.session import Model
 from pns_common.schemes import Scheme
 
@@ -31,6 +30,7 @@ from ..course import Course
 from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
+from ..gltf.write.parents import Arrays, matrix_arrays
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
@@ -96,7 +96,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
     # What only a terminal sees, workers do not load.
     from rich.console import Console
 
-    planned = _planned(jobs)
+    planned = _planned(jobs, options)
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -144,8 +144,10 @@ def _convert_one(
         sys.stdout.buffer.flush()
     else:
         replace_file(job.output, written.content)
-    if jobs.map is not None and written.parents is not None:
-        replace_file(jobs.map, _as_npz(written.parents))
+    if jobs.map is not None:
+        file = BytesIO()
+        np.savez_compressed(file, allow_pickle=False, **written.parents)
+        replace_file(jobs.map, file.getvalue())
     if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(jobs.report, text + b"\n")
@@ -156,7 +158,7 @@ def _convert_one(
     console.print(f"{name}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
 
 
-def _planned(jobs: Jobs) -> list[_Job]:
+def _planned(jobs: Jobs, options: Options) -> list[_Job]:
     """Plan what becomes of each file, before any work. Raises InvalidParameter."""
     several = len(jobs.sources) > 1
     into = jobs.output.is_dir() or (several and jobs.output != STREAM)
@@ -179,14 +181,19 @@ def _planned(jobs: Jobs) -> list[_Job]:
             ending = source.suffix if target == kind and source != STREAM else f".{target}"
             output = jobs.output / f"{stem}{ending}"
         _check_output(jobs, source, output)
-        if jobs.map is not None and {kind, target} & {*GLTF_KINDS}:
-            raise InvalidParameter(
-                "map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out"
-            )
+        if jobs.map is not None:
+            _check_map(source, kind, target, options)
         if any(output == job.output for job in planned):
             raise InvalidParameter("OUT", f"{output}: two files would be written to it")
         planned.append(_Job(source, kind, output, target))
     return planned
+
+
+def _check_map(source: Path, kind: str, target: str, options: Options) -> None:
+    if (kind in GLTF_KINDS) != (target in GLTF_KINDS):
+        raise InvalidParameter("map", f"{source}: a map needs glTF in and out, or neither")
+    if target in GLTF_KINDS and options.compress == "draco":
+        raise InvalidParameter("map", f"{source}: Draco orders vertices anew, and a map names them")
 
 
 def _check_output(jobs: Jobs, source: Path, output: Path) -> None:
@@ -215,7 +222,7 @@ def converted(
 ) -> Written:
     """Refine the bytes of a file of `kind` into those of one of `target`; no file is touched.
 
-    `traced` asks for the parents of vertices, which no glTF has.
+    `traced` asks for the parents of vertices; none of a glTF and another format.
 
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
@@ -224,7 +231,7 @@ def converted(
     if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
         sent = Sent(data, cast(Kind, kind), siblings)
-        return _by_gltf(sent, target, options, model, limits, course)
+        return _by_gltf(sent, target, options, model, limits, course, traced=traced)
     with course.stage("read", 0.0, 0.1):
         mesh, polygons = _taken(read_within(data, kind, limits), options, model)
     if target in GLTF_KINDS and polygons is None:
@@ -256,7 +263,7 @@ def converted(
             FORMATS[target].write(kept),
             _with_changes(report, changes),
             len(kept.sizes),
-            parents=parents,
+            parents={} if parents is None else matrix_arrays(parents),
         )
     return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
 
@@ -268,6 +275,8 @@ def _by_gltf(
     model: Model | None,
     limits: Limits,
     course: Course,
+    *,
+    traced: bool = False,
 ) -> Written:
     """Refine a glTF into a file of `target`."""
     done = subdivide_gltf(
@@ -280,9 +289,10 @@ def _by_gltf(
         sent.siblings,
         sent.losses,
         sent.parts,
+        traced=traced,
     )
     written = _of_gltf(done.glb, done.report, target, limits)
-    return replace(written, seconds=done.timings, faces_in=done.faces_in)
+    return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
 
 
 def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:
@@ -367,7 +377,7 @@ class Written:
         content, report, faces: its bytes, its report, how many faces it has.
         faces_in: how many the input has.
         seconds: what each stage took.
-        parents: the vertices of the input that each of its vertices is made of, if asked for.
+        parents: the arrays of a map of its vertices, if asked for.
     """
 
     content: bytes
@@ -375,21 +385,7 @@ class Written:
     faces: int
     seconds: dict[str, float] = field(default_factory=dict)
     faces_in: int = 0
-    parents: SubdivisionMatrix | None = None
-
-
-def _as_npz(parents: SubdivisionMatrix) -> bytes:
-    """Write a matrix as `scipy.sparse.load_npz` reads it."""
-    file = BytesIO()
-    np.savez_compressed(
-        file,
-        format=b"csr",
-        shape=parents.shape,
-        data=parents.weights,
-        indices=parents.columns,
-        indptr=parents.starts,
-    )
-    return file.getvalue()
+    parents: Arrays = field(default_factory=dict)
 
 
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:

@@ -67,7 +67,9 @@ def refine_mesh_file(
         raise UnrefinableError("no face has three different vertices")
     parents = made.parents
     if parents is not None:
-        parents = replace(parents, shape=(parents.shape[0], len(mesh.vertices)))
+        rows = np.concatenate([primitive.rows for primitive in made.primitives])
+        shape = (parents.shape[0], len(mesh.vertices))
+        parents = replace(parents, columns=rows[parents.columns], shape=shape)
     refined = joined(mesh, parts, made.kept, made.refined, options.levels, parents)
     if NORMAL not in mesh.layers and options.normals == "keep":
         # Those that smoothing groups gave: these stay themselves.
