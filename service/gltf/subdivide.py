@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -66,16 +65,13 @@ def subdivide_gltf(
     limits: Limits,
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
-    losses: Sequence[Change] = (),
-    parts: frozenset[int] | None = None,
     *,
     traced: bool = False,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
-    `course` receives the progress. `siblings` are the files that the document may name. `losses`
-    are changes of an earlier conversion to glTF, for the report; `parts` the primitives to refine
-    that it found. `traced` asks for the parents of vertices.
+    `course` receives the progress. `siblings` are the files that the document may name. `traced`
+    asks for the parents of vertices.
 
     Raises:
         ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
@@ -96,7 +92,7 @@ def subdivide_gltf(
             more = packing + (BYTES_PER_FACE_OF_MESH + packing) // 2
             check_cost(upload.document, upload.plans, len(data), options.levels, limits, more)
         instances = mesh_instances(upload.document)
-        changes = [*losses, *_changes_of_container(upload, options)]
+        changes = _changes_of_container(upload, options)
         changes += upload.changes + storage_changes(upload.document, upload.plans)
         writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
 
@@ -108,7 +104,7 @@ def subdivide_gltf(
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
     parents: Arrays = {}
     with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course, parts, traced=traced):
+        for first in refined_meshes(upload, firsts, scheme, options, course, traced=traced):
             with course.stage("write"):
                 written = writer.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]

@@ -23,9 +23,8 @@ from pns_common.model.session import Model
 from pns_common.schemes import Scheme
 
 from ..bodies.folder import folder_of
-from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
+from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles
-from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import Media, read_upload
@@ -35,14 +34,12 @@ from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
 from .flatten import flatten
-from .formats import FORMATS, held
+from .formats import FORMATS, held, read_within
+from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .parts import with_group_normals
 from .polygons import refine_polygons
-from .polygons_glb import polygons_glb
 from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
-from .to_gltf import as_gltf, read_within
-from .triangles_glb import as_gltf_json
 from .triangulate import triangulated
 
 if TYPE_CHECKING:
@@ -230,75 +227,48 @@ def converted(
     course = Course() if course is None else course
     if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
-        sent = Sent(data, cast(Kind, kind), siblings)
-        return _by_gltf(sent, target, options, model, limits, course, traced=traced)
+        media = cast(Media, kind)
+        done = subdivide_gltf(data, media, options, model, limits, course, siblings, traced=traced)
+        written = _of_gltf(done.glb, done.report, target, limits)
+        return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
     with course.stage("read", 0.0, 0.1):
-        mesh, polygons = _taken(read_within(data, kind, limits), options, model)
-    if target in GLTF_KINDS and polygons is None:
-        sent = as_gltf(mesh, siblings, options)
-        # Files of polygons have them: what comes as triangles stays triangles.
-        options = replace(options, polygons="off")
-        return _by_gltf(sent, target, options, model, limits, course)
+        mesh, scheme = _taken(read_within(data, kind, limits), options, model)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
         if NORMAL not in mesh.layers and options.normals == "auto":
             options = replace(options, normals="smooth")
+    elif options.compress != "none":
+        mesh = mesh.with_changes([Change("", "not compressed: only a glTF is", 1)])
+        options = replace(options, compress="none")
     with course.part(0.1, 0.8):
-        scheme = make_scheme(options, model) if polygons is None else polygons
-        refined, report = (refine_mesh_file if polygons is None else refine_polygons)(
+        refined, report = (refine_polygons if scheme.base.polygons else refine_mesh_file)(
             mesh, scheme, options, limits, course, traced=traced
         )
     with course.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
-            glb, report = polygons_glb(refined, report, options, limits, siblings)
+            glb, report = as_glb(refined, report, options, siblings, course)
             written = _of_gltf(glb, report, target, limits)
-            return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
-        kept, changes = held(refined, target)
-        if options.compress != "none":
-            changes.append(Change("", "not compressed: only a glTF is", 1))
-        parents = kept.parents
-        if parents is not None and target == "stl":
-            parents = parents.take(kept.corners)
-        written = Written(
-            FORMATS[target].write(kept),
-            _with_changes(report, changes),
-            len(kept.sizes),
-            parents={} if parents is None else matrix_arrays(parents),
-        )
+        else:
+            kept, changes = held(refined, target)
+            written = Written(
+                FORMATS[target].write(kept),
+                _with_changes(report, changes),
+                len(kept.sizes),
+                parents=_map_of(kept, target),
+            )
     return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
 
 
-def _by_gltf(
-    sent: Sent,
-    target: str,
-    options: Options,
-    model: Model | None,
-    limits: Limits,
-    course: Course,
-    *,
-    traced: bool = False,
-) -> Written:
-    """Refine a glTF into a file of `target`."""
-    done = subdivide_gltf(
-        sent.data,
-        cast(Media, sent.kind),
-        options,
-        model,
-        limits,
-        course,
-        sent.siblings,
-        sent.losses,
-        sent.parts,
-        traced=traced,
-    )
-    written = _of_gltf(done.glb, done.report, target, limits)
-    return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
+def _map_of(mesh: MeshFile, target: str) -> Arrays:
+    if mesh.parents is None:
+        return {}
+    # The vertices of an STL are its corners.
+    return matrix_arrays(mesh.parents.take(mesh.corners) if target == "stl" else mesh.parents)
 
 
-def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:
-    """Return a file's mesh, and the scheme that refines its polygons; None: it is of triangles."""
-    flat = bool((mesh.sizes == 3).all())
-    if options.scheme == "catmull-clark" or not flat:
+def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme]:
+    """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
+    if options.scheme == "catmull-clark" or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
         wants = [name for name in ("material", "group") if getattr(options, name)]
         if scheme is not None and not wants:
@@ -306,9 +276,9 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
         if options.scheme == "catmull-clark":
             raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
         if scheme is not None:
-            told = Change("", f"polygons cut into triangles, which {wants[0]} needs", 1)
-            mesh = replace(mesh, changes=(*mesh.changes, told))
-    return triangulated(mesh), None
+            told = f"polygons cut into triangles, which {wants[0]} needs"
+            mesh = mesh.with_changes([Change("", told, 1)])
+    return triangulated(mesh), make_scheme(options, model)
 
 
 def predicted_faces(

@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh import repeated_vertex
+from pns_common.mesh import fans, repeated_vertex
 from pns_common.rows import distinct_rows, marked
 
 from ..errors import UnreadableError, UnrefinableError
+from ..gltf.read.plan import check_memory
 from ..meshes.far_from_origin import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
+from ..options import Limits
 from ..report import Change
 from .mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, OBJECT, SMOOTHING, UV, MeshFile
 from .obj import as_fractions, read_obj, write_obj
@@ -22,7 +24,7 @@ from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
 from .text import count_words
-from .triangulate import fan, triangulated
+from .triangulate import triangulated
 
 _SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 
@@ -116,10 +118,17 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
             f"vertex {wrong[0]} of the {kind.upper()} file has a coordinate that is NaN or infinite"
         )
     unused = count - int(np.count_nonzero(used))
-    if unused:
-        told = Change("", "vertices dropped that no face uses", unused)
-        mesh = replace(mesh, changes=(*mesh.changes, told))
-    return mesh
+    told = [Change("", "vertices dropped that no face uses", unused)] if unused else []
+    return mesh.with_changes(told)
+
+
+def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
+    """Read a mesh file, if reading takes no more memory than it may.
+
+    Raises as `read_polygons`, and LimitError.
+    """
+    check_memory(memory_to_read(data, kind), limits)
+    return read_polygons(data, kind)
 
 
 def write(mesh: MeshFile, kind: str) -> bytes:
@@ -183,7 +192,7 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    faces = fan(mesh)
+    faces = mesh.corners[fans(mesh.offsets)[0]]
     after = _without_area(mesh.vertices.astype(np.float32), faces)
     # Most meshes have no such face, and then none that rounding makes.
     before = _without_area(mesh.vertices, faces) if after.any() else after

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -85,6 +86,22 @@ class MeshFile:
     def faces(self) -> Int[np.ndarray, "F 3"]:
         """The vertices of triangles; raises ValueError where a face is none."""
         return self.corners.reshape(len(self.offsets) - 1, 3)
+
+    def with_changes(self, changes: Iterable[Change]) -> MeshFile:
+        """Return a copy of which more was dropped or mended."""
+        return replace(self, changes=(*self.changes, *changes))
+
+    def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
+        """Return the triangles of its faces, by the places of their corners and by their face."""
+        flat = places.reshape(-1)
+        return replace(
+            self,
+            offsets=np.arange(0, len(flat) + 1, 3),
+            corners=self.corners[flat],
+            layers={name: Layer(own.values, own.rows[flat]) for name, own in self.layers.items()},
+            face_values={name: values[face] for name, values in self.face_values.items()},
+            labels={k: Labels(own.names, own.of_face[face]) for k, own in self.labels.items()},
+        )
 
 
 def of_triangles(

@@ -76,18 +76,15 @@ def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None
     return chosen
 
 
-def parts_of(
-    mesh: MeshFile, chosen: Bool[np.ndarray, " F"] | None = None
-) -> tuple[list[Part], list[Change]]:
-    """Divide triangles by material, in the order in which materials occur, and by being chosen.
+def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
+    """Divide triangles by material, in the order in which materials occur.
 
     A part has the layers that all of its corners have; what others lose is reported.
     """
     materials = mesh.labels.get(MATERIAL)
     count = len(mesh.faces)
     of_face = np.zeros(count, dtype=np.int64) if materials is None else materials.of_face + 1
-    key = of_face if chosen is None else 2 * of_face + chosen
-    order, first = number_by_first_appearance(key)
+    order, first = number_by_first_appearance(of_face)
     parts: list[Part] = []
     lost: dict[str, int] = {}
     for number, place in enumerate(first.tolist()):

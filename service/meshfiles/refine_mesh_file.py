@@ -22,6 +22,7 @@ from ..gltf.read.plan import (
     check_memory,
 )
 from ..gltf.refine.meshes import refine_alone, stage_shares
+from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
 from .mesh_file import NORMAL, MeshFile
@@ -112,4 +113,5 @@ def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit
     each += BYTES_FOR_NORMALS * (options.normals not in ("auto", "keep"))
+    each += compression.BYTES_PER_FACE[options.compress]
     check_memory(faces * each, limits)

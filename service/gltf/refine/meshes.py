@@ -99,13 +99,11 @@ def refined_meshes(
     scheme: Scheme,
     options: Options,
     course: Course,
-    parts: frozenset[int] | None = None,
     *,
     traced: bool = False,
 ) -> Iterator[MeshOutcome]:
     """Refine meshes of an upload; each is yielded inside the part of the course for its writing.
 
-    `parts`, if given, are the primitives to refine, in place of those that the options name.
     `traced` asks for the parents of vertices.
 
     Raises:
@@ -114,9 +112,7 @@ def refined_meshes(
     """
     shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
-    chosen = None if parts is not None else chosen_primitives(upload, options)
-    if parts is not None:
-        chosen = {(plan.mesh, n): n in parts for plan in plans for n in plan.primitives}
+    chosen = chosen_primitives(upload, options)
     for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):

@@ -15,9 +15,9 @@ from service.errors import LimitError, UnreadableError, UnrefinableError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles import formats
 from service.meshfiles.example import part
+from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import MATERIAL, UV, MeshFile, of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
-from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.support.shared import shared_path
 
