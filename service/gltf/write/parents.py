@@ -1,4 +1,4 @@
-"""What refined vertices are made of, as arrays of an .npz file."""
+"""Parents of refined vertices, as arrays of an .npz file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What reading a mesh file may cost, and what no glTF can hold of one."""
+"""Limits on reading a mesh file, and on positions of a glTF."""
 
 from __future__ import annotations
 
