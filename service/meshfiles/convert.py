@@ -38,7 +38,6 @@ from .formats import FORMATS, held, read_within
 from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .parts import with_group_normals
-from .polygons import refine_polygons
 from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
 from .triangulate import triangulated
 
@@ -241,9 +240,7 @@ def converted(
         mesh = mesh.with_changes([Change("", "not compressed: only a glTF is", 1)])
         options = replace(options, compress="none")
     with course.part(0.1, 0.8):
-        refined, report = (refine_polygons if scheme.base.polygons else refine_mesh_file)(
-            mesh, scheme, options, limits, course, traced=traced
-        )
+        refined, report = refine_mesh_file(mesh, scheme, options, limits, course, traced=traced)
     with course.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
             glb, report = as_glb(refined, report, options, siblings, course)

@@ -101,6 +101,10 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
     """
     mesh = FORMATS[kind].read(data)
     count = len(mesh.vertices)
+    proper = mesh.sizes >= 3
+    if not proper.all():
+        told = "faces of fewer than three vertices dropped"
+        mesh = mesh.of_faces(proper).with_changes([Change("", told, int((~proper).sum()))])
     if len(mesh.corners) == 0:
         raise UnreadableError(f"the {kind.upper()} file has no faces of three vertices")
     if not (mesh.corners.min() >= 0 and mesh.corners.max() < count):

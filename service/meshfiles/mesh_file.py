@@ -91,6 +91,18 @@ class MeshFile:
         """Return a copy of which more was dropped or mended."""
         return replace(self, changes=(*self.changes, *changes))
 
+    def of_faces(self, keep: Bool[np.ndarray, " F"]) -> MeshFile:
+        """Return a copy of some of its faces."""
+        corner = np.repeat(keep, self.sizes)
+        return replace(
+            self,
+            offsets=offsets_of(self.sizes[keep]),
+            corners=self.corners[corner],
+            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
+            face_values={name: values[keep] for name, values in self.face_values.items()},
+            labels={k: Labels(own.names, own.of_face[keep]) for k, own in self.labels.items()},
+        )
+
     def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
         """Return the triangles of its faces, by the places of their corners and by their face."""
         flat = places.reshape(-1)

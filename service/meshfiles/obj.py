@@ -32,7 +32,6 @@ from .mesh_file import (
 )
 from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
 
-SIDES = "faces of fewer than three vertices"
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
 _LIBRARY = b"mtllib"
 _DROPPED = {
@@ -70,12 +69,6 @@ def read_obj(data: bytes) -> MeshFile:
         why = "they count from 1" if name == 0 else f"there are {there}"
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
-    proper = sizes >= 3
-    lost[SIDES] = int((~proper).sum())
-    if lost[SIDES]:
-        of_proper = np.repeat(proper, sizes)
-        v, vt, vn = v[of_proper], vt[of_proper], vn[of_proper]
-        sizes, line = sizes[proper], line[proper]
     layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)

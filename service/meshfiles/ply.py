@@ -24,7 +24,6 @@ POLYGON = frozenset({"vertex_index", "vertex_indices"})
 STRIPS = "tristrips"
 # Two numbers for each of a face's corners.
 CORNER_UV = "texcoord"
-SIDES = "faces of fewer than three vertices"
 
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {
@@ -160,28 +159,25 @@ def read_ply(data: bytes) -> MeshFile:
     polygons = next((lists[name] for name in POLYGON if name in lists), None)
     if polygons is None or not len(polygons.sizes):
         sizes, corners = _of_strips(tables.get(STRIPS, {}))
-        face, lists, proper = {}, {}, np.ones(len(sizes), dtype=bool)
+        face, lists = {}, {}
     else:
         sizes, corners = polygons.sizes, polygons.values.astype(np.int64)
-        proper = sizes >= 3
-        lost[SIDES] = int((~proper).sum())
-        corners = corners[np.repeat(proper, sizes)]
     layers = {name: Layer(values, corners) for name, values in _layers(vertex).items()}
     for name in lists.keys() - POLYGON - {CORNER_UV}:
         lost[f"face property {name}"] += len(sizes)
     corner_uv = lists.get(CORNER_UV)
     if corner_uv is not None:
         if (corner_uv.sizes == 2 * sizes).all():
-            values = corner_uv.values.reshape(-1, 2)[np.repeat(proper, sizes)]
+            values = corner_uv.values.reshape(-1, 2)
             layers[UV] = Layer(values.astype(np.float64), np.arange(len(values)))
         else:
             lost["texture coordinates that not all corners have"] += len(sizes)
     return MeshFile(
         vertices,
-        offsets_of(sizes[proper]),
+        offsets_of(sizes),
         corners,
         layers,
-        _face_values({name: column[proper] for name, column in face.items()}),
+        _face_values(face),
         double=any(
             one.name == "x" and one.kind == "f8"
             for element in header.elements
