@@ -17,8 +17,18 @@ from ..meshes.far_from_origin import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
 from ..options import Limits
 from ..report import Change
-from .mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, OBJECT, SMOOTHING, UV, MeshFile
-from .obj import as_fractions, read_obj, write_obj
+from .mesh_file import (
+    COLOUR,
+    GROUP,
+    MATERIAL,
+    NORMAL,
+    OBJECT,
+    SMOOTHING,
+    UV,
+    MeshFile,
+    as_fractions,
+)
+from .obj import read_obj, write_obj
 from .off import read_off, write_off
 from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply

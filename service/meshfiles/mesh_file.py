@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -127,6 +127,34 @@ def of_triangles(
     given = {NORMAL: normals, UV: uv}
     layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
+
+
+def as_fractions(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions of 1, whatever type stores them."""
+    return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
+
+
+def joined_layer(
+    parts: Sequence[tuple[Shaped[np.ndarray, "N K"] | None, Int[np.ndarray, " C"]]],
+) -> Layer:
+    """Join values of one name, some of which a part has, and the rows of all corners.
+
+    Colours of different types become fractions with opacity.
+    """
+    given = [values for values, _ in parts if values is not None]
+    rows: list[Int[np.ndarray, " C"]] = []
+    total = 0
+    for values, own in parts:
+        rows.append(np.where((own < 0) | (values is None), NONE, own + total))
+        total += 0 if values is None else len(values)
+    if len({(values.dtype, values.shape[1]) for values in given}) > 1:
+        width = max(values.shape[1] for values in given)
+        wide = [((0, 0), (0, width - values.shape[1])) for values in given]
+        given = [
+            np.pad(as_fractions(values).astype(np.float64), pad, constant_values=1.0)
+            for values, pad in zip(given, wide, strict=True)
+        ]
+    return Layer(np.concatenate(given), np.concatenate(rows))
 
 
 def offsets_of(sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " F1"]:

@@ -27,6 +27,7 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    as_fractions,
     dropped,
     offsets_of,
 )
@@ -256,11 +257,6 @@ def write_obj(mesh: MeshFile) -> bytes:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
     pieces += _faces_text(mesh, uv, normals)
     return "".join(pieces).encode()
-
-
-def as_fractions(values: np.ndarray) -> np.ndarray:
-    """Return colours as fractions of 1, whatever type stores them."""
-    return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
 
 
 def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iterator[str]:

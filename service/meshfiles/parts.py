@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Int, Shaped
+from jaxtyping import Bool, Int
 
 from pns_common.matrix import SubdivisionMatrix
 from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
@@ -31,6 +31,7 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    joined_layer,
     of_triangles,
 )
 from .triangulate import area_vectors
@@ -200,35 +201,22 @@ def joined(
     order = slice(None) if len(refined) == 1 else np.argsort(ranks, kind="stable")
     ranks = ranks[order]
 
-    def ordered(rows: list[np.ndarray]) -> Int[np.ndarray, " C"]:
-        return np.concatenate(rows)[order].reshape(-1)
-
     ids = [primitive.vertex for primitive in refined if primitive.vertex is not None]
     used = np.flatnonzero(marked(np.concatenate(ids), 1 + max(int(own.max()) for own in ids)))
     ids = [np.searchsorted(used, own) for own in ids]
     vertices = np.empty((len(used), 3))
     for own, primitive in zip(ids, refined, strict=True):
         vertices[own] = primitive.attributes["POSITION"]
-    corners = ordered([own[p.faces] for own, p in zip(ids, refined, strict=True)])
+    corners = np.concatenate([own[p.faces] for own, p in zip(ids, refined, strict=True)])[order]
     layers: dict[str, Layer] = {}
     for name in dict.fromkeys(name for p in refined for name in p.attributes if name != "POSITION"):
-        values: list[Shaped[np.ndarray, "N K"]] = []
-        rows: list[np.ndarray] = []
-        total = 0
-        for primitive in refined:
-            own = primitive.attributes.get(name)
-            rows.append(
-                np.full(primitive.faces.shape, NONE) if own is None else primitive.faces + total
-            )
-            if own is not None:
-                values.append(own)
-                total += len(own)
-        layers[name] = Layer(np.concatenate(values), ordered(rows))
+        own = joined_layer([(p.attributes.get(name), p.faces.reshape(-1)) for p in refined])
+        layers[name] = Layer(own.values, own.rows.reshape(-1, 3)[order].reshape(-1))
     labels = {
         kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
     }
     return replace(
-        of_triangles(vertices, corners.reshape(-1, 3)),
+        of_triangles(vertices, corners),
         layers=layers,
         face_values={name: values[ranks] for name, values in mesh.face_values.items()},
         labels=labels,
