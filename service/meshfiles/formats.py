@@ -27,6 +27,7 @@ from .mesh_file import (
     UV,
     MeshFile,
     as_fractions,
+    shown,
 )
 from .obj import read_obj, write_obj
 from .off import read_off, write_off
@@ -35,8 +36,6 @@ from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
 from .text import count_words
 from .triangulate import triangulated
-
-_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 
 
 @dataclass(frozen=True)
@@ -156,25 +155,21 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     Raises:
         UnrefinableError: a position beyond the range of float32, where that is all it holds.
     """
-    form = FORMATS[kind]
+    form, lost = FORMATS[kind], dict[str, int]()
     mesh = triangulated(mesh) if kind == "stl" else mesh
     why = f" dropped: not written to {kind.upper()} files"
-    layers, lost = dict(mesh.layers), dict[str, int]()
-    for name, layer in mesh.layers.items():
-        whole = kind == "obj" or layer.complete
-        if (form.layers is not None and name not in form.layers) or not whole:
-            lost[_SHOWN.get(name, f"attribute {name}")] = 1
-            del layers[name]
+    layers = {
+        name: layer
+        for name, layer in mesh.layers.items()
+        if (form.layers is None or name in form.layers)
+        # An OBJ names values corner by corner, but for colours.
+        and (layer.complete or (kind == "obj" and name != COLOUR))
+    }
+    lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
     if kind == "obj" and COLOUR in layers:
-        if layers[COLOUR].complete:
-            alpha = (
-                layers[COLOUR].values.shape[1] == 4
-                and (as_fractions(layers[COLOUR].values)[:, 3] < 1).any()
-            )
-            lost |= {"opacity of vertex colours": 1} if alpha else {}
-        else:
-            del layers[COLOUR]
-            lost[_SHOWN[COLOUR]] = 1
+        colours = as_fractions(layers[COLOUR].values)
+        if (colours[:, 3:] < 1).any():
+            lost["opacity of vertex colours"] = 1
     values = {
         name: column
         for name, column in mesh.face_values.items()

@@ -129,6 +129,12 @@ def of_triangles(
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
 
 
+def shown(layer: str) -> str:
+    """Return what users call a layer."""
+    known = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
+    return known.get(layer, f"attribute {layer}")
+
+
 def as_fractions(values: np.ndarray) -> np.ndarray:
     """Return colours as fractions of 1, whatever type stores them."""
     return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values

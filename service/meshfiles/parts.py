@@ -20,23 +20,21 @@ from ..meshes.weld import canonical_zero
 from ..options import Options
 from ..report import Change
 from .mesh_file import (
-    COLOUR,
     GROUP,
     MATERIAL,
     NONE,
     NORMAL,
     OBJECT,
     SMOOTHING,
-    UV,
     Labels,
     Layer,
     MeshFile,
     joined_layer,
     of_triangles,
+    shown,
 )
 from .triangulate import area_vectors
 
-_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 LARGEST = float(np.finfo(np.float32).max)
 _SMOOTH_OFF = frozenset({"off", "0", ""})
 
@@ -104,14 +102,14 @@ def _primitive(
     for name, layer in mesh.layers.items():
         rows = layer.rows[corners]
         some = rows >= 0
-        shown = _SHOWN.get(name, f"attribute {name}")
+        what = shown(name)
         if not some.any():
             continue
         if not some.all():
-            shown += " that not all corners of a material have"
-            lost[shown] = lost.get(shown, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
+            what += " that not all corners of a material have"
+            lost[what] = lost.get(what, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
         elif not (np.abs(layer.values) <= LARGEST).all():
-            lost[f"{shown}, of which some are no numbers of float32,"] = len(faces)
+            lost[f"{what}, of which some are no numbers of float32,"] = len(faces)
         else:
             layers[name] = Layer(layer.values, rows)
     vertex = mesh.corners[corners]
