@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int
 
+from pns_common.columns import level_topologies
 from pns_common.creases import Creases
 from pns_common.mesh import Mesh
 from pns_common.normals import angle_weighted_normals, smooth_fans
@@ -19,16 +20,17 @@ from pns_common.refinement import Refinement, refine
 from pns_common.report import Report
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
-from pns_common.topology import EdgeClass, Topology, build_topology
 
 from ..advice import Bends, count_bends
 from ..course import Course
 from ..errors import UnrefinableError
+from ..gltf.refine.attributes import in_type_of
 from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.near_misses import near_miss_changes, near_misses
 from ..gltf.refine.normals import safe_unit
 from ..gltf.refine.polygons import PolygonSplit
 from ..meshes.shape_creases import creases_by_shape
+from ..meshes.uv_charts import refined_charts
 from ..meshes.weld import Weld, weld, weld_by_label
 from ..meshes.weld_tolerance import weld_within
 from ..options import Options
@@ -106,7 +108,7 @@ def refine_polygons(
             progress=lambda done, total: course.reach(done / total),
         )
     with course.stage("attributes", 0.7, 1.0):
-        refined = _with_layers(mesh, control, made, options)
+        refined = _with_layers(mesh, control, creases, made, options)
     if traced:
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
@@ -188,14 +190,16 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
     return edges[hard]
 
 
-def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
+def _with_layers(
+    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
+) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners = made.mesh.corners
     counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
     of_face = np.repeat(control.faces, counts)
     layers: dict[str, Layer] = {}
     for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, options)
+        layers[name] = _refined(name, layer, control, creases, options)
     if options.normals == "smooth":
         layers[NORMAL] = _smooth_normals(made)
     elif NORMAL in layers:
@@ -219,41 +223,31 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
     )
 
 
-def _refined(name: str, layer: Layer, control: _Control, options: Options) -> Layer:
+def _refined(
+    name: str, layer: Layer, control: _Control, creases: Creases, options: Options
+) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
     values, offsets = layer.values, control.mesh.offsets
     bare = np.logical_or.reduceat(rows < 0, offsets[:-1])
-    label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
-    number, first = number_by_first_appearance(label)
-    column = values[np.maximum(rows[first], 0)]
-    topology = build_topology((number, offsets), len(first))
-    for depth in range(options.levels):
-        if depth:
-            topology = CATMULL_CLARK.split(topology, Blocks())
-        column = _placed(name, column, topology, smooth=name == UV and options.uv == "smooth")
-    corners = CATMULL_CLARK.faces(topology, Blocks(), np.int64).reshape(-1)
+    if name == UV and options.uv == "smooth":
+        asked = values[np.maximum(rows, 0)], control.mesh.corners, offsets, options.levels
+        column, corners = refined_charts(*asked, creases, CATMULL_CLARK)
+    else:
+        label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
+        number, first = number_by_first_appearance(label)
+        column = values[np.maximum(rows[first], 0)]
+        whole, faces = column.dtype.kind != "f" and name != COLOUR, (number, offsets)
+        levels = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
+        for split in map(PolygonSplit, levels):
+            column = split.nearest(column) if whole else split.linear(column)
+        corners = PolygonSplit(levels[-1]).quads
+    corners = corners.reshape(-1)
     if bare.any():
         counts = 4 * np.diff(offsets) * 4 ** (options.levels - 1)
         corners = np.where(np.repeat(bare, counts), NONE, corners)
-    if column.dtype != values.dtype:
-        column = np.rint(column) if values.dtype.kind in "ui" else column
-    return Layer(column.astype(values.dtype), corners)
-
-
-def _placed(
-    name: str, column: Shaped[np.ndarray, "N K"], mesh: Topology, *, smooth: bool
-) -> Shaped[np.ndarray, "M K"]:
-    """Return values at old vertices, edges and faces: linear, or those of whole numbers."""
-    split = PolygonSplit(mesh)
-    if column.dtype.kind != "f" and name != COLOUR:
-        return split.nearest(column)
-    if smooth:
-        rim = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)
-        made = CATMULL_CLARK.place(column.astype(np.float64), mesh, Blocks(available_threads()))
-        made[rim] = column[rim]
-        return made
-    return split.linear(column)
+    column = column if column.dtype == values.dtype else in_type_of(values, column)
+    return Layer(column, corners)
 
 
 def _normals(
