@@ -1,4 +1,4 @@
-"""What the construction promises for any weights, on any mesh, at any level."""
+"""Promises of the construction, for any weights, on any mesh, at any level."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_only_interior_edges_are_corrected(mesh, model):
 
 
 def moved_apart(mesh, model, seed):
-    """How far refining commutes with a random rigid motion, at each vertex."""
+    """Return how far refining fails to commute with a random rigid motion, at each vertex."""
     rng = np.random.default_rng(seed)
     turn, shift = rotation(rng), rng.standard_normal(3)
     still = refine(mesh, pns(model), 1)

@@ -36,7 +36,7 @@ RATE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Attack:
-    """What a search found.
+    """The result of a search.
 
     Attributes:
         cap: what the theorem lets the value reach.
@@ -58,7 +58,7 @@ class Attack:
 
     @property
     def held(self) -> bool:
-        """Whether the value stayed at or below its cap throughout."""
+        """True where the value stayed at or below its cap throughout."""
         return self.worst <= self.cap
 
 

@@ -54,7 +54,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether everything that counts has passed."""
+        """True where everything that counts has passed."""
         return all(certificate.passed for certificate in self.certificates if certificate.counts)
 
 

@@ -200,12 +200,12 @@ class Spectrum:
 
     @property
     def least_tangent(self) -> int:
-        """Which of the tangent eigenvalues is smallest."""
+        """Return which of the tangent eigenvalues is smallest."""
         return int(np.argmin(np.where(self.tangent, np.abs(self.values), np.inf)))
 
     @property
     def largest_other(self) -> int:
-        """Which of the others is largest."""
+        """Return which of the others is largest."""
         return int(np.argmax(np.where(self.tangent, -1.0, np.abs(self.values))))
 
     @property
