@@ -46,7 +46,7 @@ lint: $(DEV)/.ready size
 	$(DEV)/bin/lint-imports
 	$(DEV)/bin/python docs/prose.py
 
-# Docstrings that open with no verb, and sentences of more than 40 words: no more than docs/prose.json allows.
+# Fails for docstrings that open with no verb, and for sentences of more than 40 words.
 prose: $(DEV)/.ready
 	$(DEV)/bin/python docs/prose.py
 

@@ -1,27 +1,19 @@
-"""`make prose`: count what makes our English hard to read, and fail where a count has grown.
+"""`make prose`: find what makes our English hard to read, and fail where there is some.
 
-Three things are counted, and docs/prose.json holds how many of each there may be:
-
-    functions    docstrings of functions that do not open with a verb
-    questions    docstrings of anything that open with What, Who, Whether, Where, Which or How
-    sentences    sentences of more than 40 words in pages
-
-    python docs/prose.py              # fails above a budget, and names the places
-    python docs/prose.py --update     # writes the counts as the new budgets
+functions    docstrings of functions that do not open with a verb
+questions    docstrings of anything that open with What, Who, Whether, Where, Which or How
+sentences    sentences of more than 40 words in pages
 """
 
 from __future__ import annotations
 
 import ast
-import json
 import re
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BUDGETS = Path(__file__).with_suffix(".json")
 PACKAGES = ("addons", "benchmarks", "docs", "export", "pns_common", "service", "tests", "train")
 PAGES = ("README.md", "CONTRIBUTING.md", "docs")
 LONGEST = 40
@@ -33,37 +25,27 @@ NO_VERBS |= {"by", "from", "with", "without", "as", "if", "when", "while", "ther
 # A test's name is its claim, and its docstring says more of it.
 CLAIMS = "tests"
 
-Found = tuple[str, str, str]
+# A kind of fault, and its place.
+Found = tuple[str, str]
 
 
-def main(arguments: list[str]) -> int:
-    """Count, compare with the budgets or write them, and return the exit status."""
+def main() -> int:
+    """Print what is found, and return the exit status."""
     found = [*docstrings(), *sentences()]
-    counts = Counter(f"{kind} {where}" for kind, where, _ in found)
-    if arguments == ["--update"]:
-        BUDGETS.write_text(json.dumps(dict(sorted(counts.items())), indent=2) + "\n")
-        return 0
-    budgets = json.loads(BUDGETS.read_text())
-    grown = {name for name, count in counts.items() if count > budgets.get(name, 0)}
-    for kind, where, place in found:
-        if f"{kind} {where}" in grown:
-            print(f"{kind}: {place}")
-    for name in sorted(grown):
-        print(f"{name}: {counts[name]}, and {budgets.get(name, 0)} are allowed")
-    if room := sorted(name for name in budgets if counts[name] < budgets[name]):
-        print(f"fewer than allowed (python docs/prose.py --update): {', '.join(room)}")
-    return 1 if grown else 0
+    for kind, place in found:
+        print(f"{kind}: {place}")
+    return 1 if found else 0
 
 
 def docstrings() -> Iterator[Found]:
-    """Yield docstrings that open badly: the kind of fault, the package, and the place."""
+    """Yield docstrings that open badly."""
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text())):
                 line = getattr(node, "lineno", 1)
                 place = f"{path.relative_to(ROOT)}:{line}"
                 for kind in faults(node, package):
-                    yield kind, package, place
+                    yield kind, place
 
 
 def faults(node: ast.AST, package: str) -> Iterator[str]:
@@ -88,7 +70,7 @@ def is_property(node: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
 
 
 def sentences() -> Iterator[Found]:
-    """Yield sentences that are too long: the kind of fault, the page's group, and the place."""
+    """Yield sentences that are too long."""
     for group in PAGES:
         path = ROOT / group
         for page in sorted(path.rglob("*.md")) if path.is_dir() else [path]:
@@ -96,7 +78,7 @@ def sentences() -> Iterator[Found]:
                 words = len(sentence.split())
                 if words > LONGEST:
                     place = f"{page.relative_to(ROOT)}: {words} words: {sentence[:60]}…"
-                    yield "sentences", group, place
+                    yield "sentences", place
 
 
 def sentences_of(text: str) -> Iterator[str]:
@@ -112,4 +94,4 @@ def sentences_of(text: str) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

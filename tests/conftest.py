@@ -1,4 +1,4 @@
-"""What every test runs with; tests of the library alone also with its array annotations enforced.
+"""Fixtures of every test; those of the library alone run with its array annotations enforced too.
 
 Shapes and kinds are checked at run time in a run over tests/library and nothing else. It takes
 five times as long, and a shape does not hang on the numbers: of each test the first parameters

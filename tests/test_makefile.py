@@ -1,4 +1,4 @@
-"""What `make` sets up is what is pinned, wherever the checkout lies."""
+"""`make` sets up the pinned versions, wherever the checkout lies."""
 
 import shutil
 import subprocess

@@ -43,7 +43,7 @@ class Connectivity:
 
     @property
     def paired(self) -> Bool[Tensor, " E"]:
-        """Whether an edge has two faces of opposite direction."""
+        """True for edges with two faces of opposite direction."""
         return self.half_edges[:, 0] >= 0
 
     @property
@@ -82,7 +82,7 @@ class Connectivity:
 
     @cached_property
     def ringed(self) -> Bool[Tensor, " V"]:
-        """Whether all edges of a vertex have two faces, and these make one fan."""
+        """True for vertices whose edges all have two faces that make one fan."""
         open_ends = torch.bincount(
             self.edges[~self.paired].reshape(-1), minlength=self.vertex_count
         )

@@ -29,7 +29,7 @@ class Curves:
 
     @cached_property
     def irregular(self) -> Bool[Tensor, " E"]:
-        """Whether an edge has neither one face nor two."""
+        """True for edges with neither one face nor two."""
         return ~(self.mesh.boundary | self.mesh.paired)
 
     @cached_property
@@ -40,13 +40,13 @@ class Curves:
 
     @cached_property
     def shares(self) -> Float[Tensor, " W"]:
-        """How far each new vertex is on a curve."""
+        """Return how far each new vertex is on a curve."""
         moved = (self.at_vertices > 0)[self.mesh.edges].any(dim=1) & ~self.irregular
         return torch.cat([self.at_vertices, torch.where(moved, self.mesh.sharpness, 0.0)])
 
     @property
     def of_boundary(self) -> Bool[Tensor, " W"]:
-        """Whether the boundary alone places a new vertex."""
+        """Return which new vertices the boundary alone places."""
         alone = (self._count(self.mesh.boundary) == 2) & (self.at_vertices == 1)
         return torch.cat([alone, self.mesh.boundary])
 

@@ -35,7 +35,7 @@ Network = Callable[[Tensor], Tensor]
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What is measured of a mesh with corners at `points`."""
+    """Measurements of a mesh with corners at `points`."""
 
     mesh: Connectivity
     points: Float[Tensor, "V 3"]

@@ -58,7 +58,7 @@ AnyScheme = Scheme | Method | Smooth
 
 @dataclass(frozen=True, slots=True)
 class LevelFigures:
-    """What a step did, from the refinement's report.
+    """Figures of a step, from the refinement's report.
 
     Attributes:
         ratio: largest proximity ratio, of edge and of old vertices.

@@ -64,7 +64,7 @@ def evaluated(objects):
 
 
 def described(objects):
-    """What Blender made of a file."""
+    """Return what Blender made of a file."""
     meshes = [o for o in objects if o.type == "MESH"]
     corners = evaluated(objects)
     keys = [o.data.shape_keys for o in meshes if o.data.shape_keys]

@@ -53,7 +53,7 @@ def main(python):
 
 
 def render(python, scene, files):
-    """What Blender made of the files."""
+    """Return what Blender made of the files."""
     output = ROOT / "docs" / scene.picture
     command = [python, RENDER, output, scene.frame, *files]
     done = subprocess.run([*map(str, command)], check=True, capture_output=True, text=True)

@@ -100,7 +100,7 @@ class Conformance:
         return {message["code"] for message in messages if message["severity"] == 0}
 
     def loaded(self, name, levels, scheme):
-        """What three.js made of the file."""
+        """Return what three.js made of the file."""
         return self._loaded[self.path(name, levels, scheme)]
 
     def meshes(self, name, levels, scheme):

@@ -24,12 +24,12 @@ def welded(primitives):
 
 
 def proper(faces):
-    """Which faces have three different vertices."""
+    """Return which faces have three different vertices."""
     return (faces != np.roll(faces, 1, axis=1)).all(axis=1)
 
 
 def open_edges(faces):
-    """How many edges have one face; a face counts once, however often it is there."""
+    """Return how many edges have one face; a face counts once, however often it is there."""
     distinct = np.unique(np.sort(faces[proper(faces)], axis=1), axis=0)
     edges = np.sort(distinct[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     return int((np.unique(edges, axis=0, return_counts=True)[1] == 1).sum())

@@ -200,7 +200,7 @@ def test_who_asks_often_fills_no_disk_with_lines(name):
 
 
 def test_each_port_of_the_pod_is_for_a_namespace_that_is_named():
-    """Whoever may speak to the pod may speak for any client, where its network is the proxies'."""
+    """A proxy may speak for any client, so each port is open to the proxies' network alone."""
     policy = BY_KIND["NetworkPolicy"]["spec"]
     assert policy["policyTypes"] == ["Ingress", "Egress"]
     assert "egress" not in policy

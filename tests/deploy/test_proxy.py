@@ -187,7 +187,7 @@ def test_one_address_has_so_many_connections_and_no_more(proxy):
 
 
 def test_a_subscribers_ipv6_addresses_are_one(proxy):
-    """Whoever has one has as many as it likes."""
+    """One subscriber has as many addresses as it likes."""
     address, _, _ = proxy
     upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
     clients = [f"2001:db8:0:1::{host:x}" for host in range(40)]

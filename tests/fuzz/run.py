@@ -26,7 +26,7 @@ ALLOWANCE = 64 * MIB
 
 @dataclass
 class Tally:
-    """What a run has seen.
+    """The counts of a run.
 
     Attributes:
         run: bodies tried.

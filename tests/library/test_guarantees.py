@@ -1,4 +1,4 @@
-"""What the construction promises for any weights, on any mesh, at any level."""
+"""Promises of the construction, for any weights, on any mesh, at any level."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from tests.support.meshes import (
     tilted_plane,
 )
 from tests.support.networks import Float64Model, huge_model, random_layers, random_model
-from train.certificates.plain_loop import plain_loop
+from train.certificates.plain import plain_loop
 
 MODELS = [random_model(0), random_model(1, scale=30.0), huge_model(2)]
 models = st.sampled_from(MODELS)
@@ -63,7 +63,7 @@ def test_only_interior_edges_are_corrected(mesh, model):
 
 
 def moved_apart(mesh, model, seed):
-    """How far refining commutes with a random rigid motion, at each vertex."""
+    """Return how far refining fails to commute with a random rigid motion, at each vertex."""
     rng = np.random.default_rng(seed)
     turn, shift = rotation(rng), rng.standard_normal(3)
     still = refine(mesh, pns(model), 1)

@@ -76,7 +76,7 @@ def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
 
 
 def fans_at(vertex, points, faces, creases=None):
-    """How many fans there are at a vertex; no two vertices share one."""
+    """Return how many fans there are at a vertex; no two vertices share one."""
     fans = smooth_fans(faces, len(points), creases)
     assert len({(fan, v) for fan, v in zip(fans.flat, faces.flat, strict=True)}) == fans.max() + 1
     return len(np.unique(fans[faces == vertex]))

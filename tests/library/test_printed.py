@@ -1,4 +1,4 @@
-"""What a user prints while trying things out fits a line, whatever it holds."""
+"""A printed object fits a line, whatever it holds."""
 
 import sys
 from base64 import b64decode

@@ -1,4 +1,4 @@
-"""What the report says of distances from Loop, held against Loop itself."""
+"""The distances from Loop in the report are those of Loop itself."""
 
 import numpy as np
 import pytest

@@ -97,7 +97,7 @@ def test_a_new_manifest_lists_what_is_there(package):
 
 
 def test_models_load_and_answer_without_anything_of_training():
-    """What the service has installed."""
+    """The service has no package of training installed."""
     code = """if True:
         import sys
         absent = "torch", "scipy", "safetensors", "msgspec", "trimesh", "train", "export"

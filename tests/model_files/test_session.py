@@ -1,4 +1,4 @@
-"""What a model answers depends on a row alone; what breaks is an error of the model."""
+"""Answers of a model depend on a row alone; a network that breaks is an error of the model."""
 
 import pickle
 import subprocess

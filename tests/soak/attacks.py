@@ -92,7 +92,7 @@ def pipelines(target: Target, ended: Event) -> None:
 
 
 def nonsense(target: Target, ended: Event) -> None:
-    """What is no HTTP, or nearly."""
+    """Send bytes that are no HTTP, or nearly."""
     messages = [
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(64),
         b"GET / HTTP/9.9\r\n\r\n",

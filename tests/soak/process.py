@@ -30,7 +30,7 @@ RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
 
 @dataclass(frozen=True)
 class Held:
-    """What the service's processes hold."""
+    """Memory and descriptors of the service's processes."""
 
     mebibytes: float
     descriptors: int

@@ -27,7 +27,7 @@ PATIENCE = 120
 
 @dataclass(frozen=True)
 class Soaked:
-    """What a soak found."""
+    """The result of a soak."""
 
     tally: Tally
     before: Held | None

@@ -1,4 +1,4 @@
-"""What honest clients send: a part in every format, no two alike, and what it must become."""
+"""Files of honest clients: a part in every format, no two alike, and the mesh it must become."""
 
 from __future__ import annotations
 

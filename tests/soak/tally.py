@@ -1,4 +1,4 @@
-"""What the clients saw."""
+"""Counts of the clients' answers."""
 
 from __future__ import annotations
 

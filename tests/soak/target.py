@@ -1,4 +1,4 @@
-"""Where an attack is aimed, and how connections are held or used side by side."""
+"""The aim of an attack, and connections that are held or used side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def head(method: str, path: str, more: str = "") -> bytes:
 
 @dataclass(frozen=True)
 class Target:
-    """What is attacked, and from where: many addresses of this machine, or (`one_source`) its own.
+    """The address under attack, and its sources: this machine's many, or (`one_source`) one.
 
     A container's bridge carries no loopback address but the one that it listens on. `struck` is set
     by the first connection that is an attack.

@@ -11,7 +11,7 @@ SECONDS = 6
 
 @pytest.fixture(scope="module")
 def soaked(tmp_path_factory):
-    """What a soak found, and the service's log."""
+    """Return the result of a soak, and the service's log."""
     log = tmp_path_factory.mktemp("soak") / "log"
     with started(log) as (address, pid):
         tally = soak(address, SECONDS, pid, say=lambda text: None)

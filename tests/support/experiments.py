@@ -1,4 +1,4 @@
-"""What a run of any experiment leaves behind: its tables and figures, and its part of the page."""
+"""A run of any experiment leaves its tables, its figures and its part of the page."""
 
 import csv
 

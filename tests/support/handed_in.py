@@ -12,7 +12,7 @@ from service.workers.progress import ProgressPage
 
 
 def work_of(body: MemoryFile, answer: MemoryFile, page: ProgressPage) -> Work:
-    """What a worker is told of a GLB, with the usual options."""
+    """Return the work that a worker is told of for a GLB, with the usual options."""
     return Work(
         body=body.name,
         answer=answer.name,

@@ -13,7 +13,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "node"
 
 
 def run(script, paths):
-    """What a script prints over files, by path. Skips the test where node is absent."""
+    """Return what a script prints over files, by path. Skips the test where node is absent."""
     install()
     command = ["node", script, *map(str, paths)]
     done = subprocess.run(command, cwd=FOLDER, check=True, capture_output=True, text=True)

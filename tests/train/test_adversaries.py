@@ -1,4 +1,4 @@
-"""What holds for any weights holds for the worst that a search over weights and mesh finds."""
+"""A promise for any weights holds for the worst that a search over weights and mesh finds."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What experiments share: rows, sources, pictures."""
+"""Experiments share rows, sources and pictures."""
 
 from __future__ import annotations
 

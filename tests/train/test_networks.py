@@ -100,7 +100,7 @@ def model(features="paper-5", orientation="symmetric", seed=0):
 
 
 def apart(mesh, twin, subject, expected=lambda positions: positions):
-    """How far the twin's refined vertices are from where they should be, where well defined."""
+    """Return how far the twin's refined vertices are from their places, where well defined."""
     positions = refine(twin.mesh, pns(subject), 1, 1.0).mesh.vertices[twin.place]
     wanted = expected(refine(mesh, pns(subject), 1, 1.0).mesh.vertices)
     kept = np.ones(len(positions), dtype=bool)

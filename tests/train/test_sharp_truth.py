@@ -1,4 +1,4 @@
-"""Which edges are sharp in truth: of exact solids, and of coarse meshes that stand for them."""
+"""Edges that are sharp in truth: of exact solids, and of coarse meshes that stand for them."""
 
 import numpy as np
 import pytest

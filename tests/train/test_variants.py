@@ -1,4 +1,4 @@
-"""What each part of the operator protects: taken out, its promise is lost and no other."""
+"""Each part of the operator protects one promise: taken out, that is lost and no other."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the baselines share: steps measured against Loop as PNS is."""
+"""Steps of baselines, measured against Loop as PNS is."""
 
 import torch
 from jaxtyping import Float

@@ -42,7 +42,7 @@ FOLLOWED = 65
 
 @dataclass(frozen=True, eq=False)
 class GapAttack:
-    """What the search found.
+    """The result of the search.
 
     Attributes:
         before: the margin of the lifted star with the weights before the search.

@@ -1,4 +1,4 @@
-"""What is certified, a scheme as it runs and in double precision, and what a certificate says."""
+"""Subjects of certification, as they run and in double precision, and their certificates."""
 
 import copy
 import math
@@ -8,6 +8,7 @@ from enum import StrEnum
 from pns_common import pns
 from pns_common.model.card import DEFAULT_FORMAT, ModelCard
 from pns_common.model.session import Model
+from train.certificates.bases import CATMULL_CLARK, LOOP, Base
 from train.models.networks import BoundedNet
 from train.models.torch_model import TorchModel
 from train.refining import AnyScheme
@@ -40,18 +41,24 @@ class Subject:
 
     @property
     def is_single_precision(self) -> bool:
-        """Whether the network runs in single precision."""
+        """True where the network runs in single precision."""
         return self.exact is not self.scheme
 
     @property
+    def base(self) -> Base:
+        """The base scheme; Loop without a model."""
+        polygons = self.card is not None and self.card.base == CATMULL_CLARK.scheme.name
+        return CATMULL_CLARK if polygons else LOOP
+
+    @property
     def learned_once(self) -> ModelCard | None:
-        """The card of a scheme that corrects at the control mesh alone, and is Loop afterwards."""
+        """The card of a scheme that corrects the control mesh alone: then it is its base."""
         card = self.card
         return card if card is not None and card.format == DEFAULT_FORMAT else None
 
     @property
     def moves_curves(self) -> bool:
-        """Whether boundaries and creases have a rule of their own."""
+        """True where boundaries and creases have a rule of their own."""
         card = self.learned_once
         return card is not None and bool(card.boundary_strength)
 
@@ -82,7 +89,7 @@ def in_double(network: BoundedNet) -> BoundedNet:
 
 
 class Kind(StrEnum):
-    """What a failure means."""
+    """The meaning of a failure."""
 
     CERTIFICATE = "certificate"  # a theorem does not hold
     MEASURED = "measured"  # a theorem's conclusion was not seen; no theorem bounds the number
@@ -111,12 +118,12 @@ class Certificate:
 
     @property
     def passed(self) -> bool:
-        """Whether the value is in its range."""
+        """True where the value is in its range."""
         return self.low <= self.value <= self.high
 
     @property
     def counts(self) -> bool:
-        """Whether failing it is failing: true of all but diagnostics."""
+        """True where failing it is failing: of all but diagnostics."""
         return self.kind is not Kind.DIAGNOSTIC
 
     @property

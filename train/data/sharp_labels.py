@@ -1,4 +1,4 @@
-"""Which edges of a coarse mesh are sharp in truth: what the sharpness network learns first.
+"""Edges of a coarse mesh that are sharp in truth: the first lesson of the sharpness network.
 
 Where the true sharp edges are known, each point of them counts for the coarse edge that is nearest
 to it and runs along it; an edge is sharp if such points cover most of it. Where only points and

@@ -39,7 +39,7 @@ from train.tensors import dot, shortened
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What surrounds a network at N new vertices, all but its answers.
+    """The surroundings of a network at N new vertices, all but its answers.
 
     Attributes:
         rows: their numbers among vertices, edges or faces.

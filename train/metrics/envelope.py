@@ -1,4 +1,4 @@
-"""How much is possible: the best that any network could do inside the envelope.
+"""The best that any network could do inside the envelope.
 
 Whatever the weights, an edge vertex stays in the ball of radius C h² γ round Loop's. The least
 |f| / ‖∇f‖ within each ball bounds every distance metric of the whole class of operators.

@@ -60,7 +60,7 @@ class LevelErrors:
 
 @dataclass(frozen=True, slots=True)
 class DistanceLevel:
-    """What a step has made, without normal errors: cheap on half a million faces."""
+    """The mesh that a step has made, without normal errors: cheap on half a million faces."""
 
     faces: int
     distance: float

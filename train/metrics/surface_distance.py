@@ -1,4 +1,4 @@
-"""How far two triangle meshes are apart as surfaces: distances and normals, both ways."""
+"""Distances and angles between normals of two triangle meshes as surfaces, both ways."""
 
 from dataclasses import dataclass, fields
 
@@ -50,7 +50,7 @@ def nearest(tree: FaceTree, points: Float[np.ndarray, "P 3"]) -> Nearest:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceErrors:
-    """How far a surface is from the true one; lengths in the true one's bounding-box diagonal.
+    """Errors of a surface against the true one; lengths in the true one's bounding-box diagonal.
 
     Attributes:
         mean: mean distance of a surface's points from the other surface, mean of both ways.

@@ -1,1 +1,1 @@
-"""What is trained: recipes, networks, their checkpoints, and the author's published networks."""
+"""Recipes, networks, their checkpoints, and the author's published networks."""

@@ -1,4 +1,4 @@
-"""What a recipe makes of edges and vertices: its untrained networks, and their rules."""
+"""Untrained networks of a recipe for edges and vertices, and their rules."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What a recipe is: everything that decides a network's trained weights."""
+"""The recipe: everything that decides a network's trained weights."""
 
 from dataclasses import dataclass
 
@@ -63,7 +63,7 @@ class NetworkShape:
 
 @dataclass(frozen=True, slots=True)
 class ScaleFree:
-    """What makes a recipe's rule scale-free (format 4), as on the card.
+    """The numbers that make a recipe's rule scale-free (format 4), as on the card.
 
     Attributes:
         base: the base scheme, "loop" or "catmull-clark".

@@ -13,6 +13,8 @@ export interface Settings {
   uv: "linear" | "smooth";
   /** Join vertices that nearly coincide. */
   weld: boolean;
+  /** Join a glTF's triangles that are one polygon, and refine quads. */
+  polygons: boolean;
   normals: "auto" | "keep" | "smooth" | "limit";
 }
 
@@ -42,6 +44,7 @@ export const DEFAULTS: Settings = {
   angle: 40,
   uv: "linear",
   weld: false,
+  polygons: false,
   normals: "auto",
 };
 
@@ -71,6 +74,7 @@ export function query(settings: Settings, classic: Classic, writing: Writing = {
   if (!loop && settings.budget !== null) parameters.set("budget", String(settings.budget));
   if (settings.limit) parameters.set("limit", "true");
   if (settings.weld) parameters.set("weld_tolerance", WELD);
+  if (settings.polygons) parameters.set("polygons", "auto");
   if (settings.normals !== "auto") parameters.set("normals", settings.normals);
   if (compress !== "none") parameters.set("compress", compress);
   if (format !== "glb") parameters.set("format", format);
@@ -95,7 +99,7 @@ export function toHash(settings: Settings, view: Record<string, string>): string
 export function fromHash(hash: string): { settings: Settings; view: Record<string, string> } {
   const given = Object.fromEntries(new URLSearchParams(hash.replace(/^#/, "")));
   const settings = { ...DEFAULTS };
-  const { levels, model, budget, limit, crease, angle, uv, weld, normals, ...view } = given;
+  const { levels, model, budget, limit, crease, angle, uv, weld, polygons, normals, ...view } = given;
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
@@ -105,6 +109,7 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
   settings.weld = weld === "true";
+  settings.polygons = polygons === "true";
   settings.normals = oneOf(normals, ["auto", "keep", "smooth", "limit"]) ?? settings.normals;
   return { settings, view };
 }

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
-import { BLUNT, CUBE } from "./support/solids.mjs";
+import { BLUNT, CUBE, CUBE_OF_TRIANGLES } from "./support/solids.mjs";
 import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
@@ -116,6 +116,18 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.click(".more summary");
     await page.check("#weld");
     await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges64"));
+  });
+
+  test("halves of quads in a glTF are joined by the setting, and refined by Catmull–Clark", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, CUBE_OF_TRIANGLES);
+    await settled(page);
+    const rule = () => page.textContent("#mathematics");
+    assert.match(await rule(), /Loop/);
+    await page.click("#settings .more summary");
+    await page.check("#polygons");
+    await page.waitForFunction(() => document.querySelector("#mathematics").textContent.includes("Catmull–Clark"));
+    assert.match(page.url(), /polygons=true/);
   });
 
   test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {

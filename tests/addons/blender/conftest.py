@@ -1,4 +1,4 @@
-"""What needs Blender is left out where it is not there; `make blender-test` runs it where it is."""
+"""Leave out tests that need Blender where it is not there; `make blender-test` runs them."""
 
 from importlib.util import find_spec
 

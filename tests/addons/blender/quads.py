@@ -42,7 +42,7 @@ def snapshot(
     crease_sharpness: float | np.ndarray,
     layers: tuple[Layer, ...],
 ) -> Snapshot:
-    """What would be read of these quads, each cut along the diagonal from its first corner."""
+    """Return what is read of these quads, each cut along the diagonal from its first corner."""
     first = 4 * np.arange(len(quads))[:, None]
     halves = first[:, None] + np.array([[0, 1, 2], [0, 2, 3]])
     corners = halves.reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""What `subdivide` is given, it gives back: each kind of mesh with the library that made it."""
+"""`subdivide` gives back the kind of mesh that it was given, made by the same library."""
 
 import subprocess
 import sys

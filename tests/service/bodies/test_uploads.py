@@ -1,4 +1,4 @@
-"""What a request's body holds, and which bodies are refused."""
+"""Bodies of requests: the files that they hold, and those that are refused."""
 
 import io
 import zipfile

@@ -1,4 +1,4 @@
-"""What cannot be done is one line and an exit code, and leaves what was there."""
+"""A refusal is one line and an exit code, and leaves everything as it was."""
 
 from __future__ import annotations
 

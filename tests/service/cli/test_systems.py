@@ -1,4 +1,4 @@
-"""What the command line does where POSIX is missing."""
+"""The command line does its work where POSIX is missing."""
 
 from __future__ import annotations
 

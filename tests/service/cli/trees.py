@@ -1,4 +1,4 @@
-"""What stands in the files that the command line wrote."""
+"""Readers of the files that the command line wrote."""
 
 from __future__ import annotations
 

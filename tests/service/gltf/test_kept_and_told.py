@@ -1,4 +1,4 @@
-"""What stays as it was, what is told, and how far the work has come."""
+"""Parts of a file that stay as they were, notes in the report, and the progress that is told."""
 
 import json
 import struct
@@ -339,7 +339,7 @@ def test_the_share_moves_through_every_stage_and_reaches_its_end(together, compr
 
 
 def test_the_share_moves_inside_the_long_stages():
-    """Where one mesh is all there is, what is told between the stages' ends is inside them."""
+    """With one mesh alone, progress is told inside the long stages."""
     shares, begun = [0.0], []
     course = Course(begins=lambda stage: begun.append((stage, len(shares))), moves=shares.append)
     options = Options(scheme="loop", levels=5)

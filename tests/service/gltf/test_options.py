@@ -1,4 +1,4 @@
-"""What a request may ask for beside the scheme: creases, smooth UVs, a weld tolerance."""
+"""Options of a request beside the scheme: creases, smooth UVs, a weld tolerance."""
 
 import numpy as np
 import pytest

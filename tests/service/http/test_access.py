@@ -1,4 +1,4 @@
-"""Who asks: addresses behind proxies, and keys."""
+"""Clients by their addresses behind proxies, and by their keys."""
 
 import asyncio
 import base64

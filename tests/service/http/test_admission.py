@@ -29,7 +29,7 @@ def test_uploads_and_jobs_are_counted_apart() -> None:
 
 
 def taken(answers: list[tuple[str, int]]) -> list[str]:
-    """What becomes of answers, of whom and how large, that are begun one after another."""
+    """Return the outcome of answers, of whom and how large, that are begun one after another."""
     outcomes: list[str] = []
 
     async def scenario() -> None:
@@ -94,7 +94,7 @@ def test_one_client_never_holds_all_bytes() -> None:
 
 
 def sent(bodies: list[tuple[str, int, str]]) -> list[str]:
-    """What becomes of bodies, of whom, how large, and whole or on their way.
+    """Return the outcome of bodies, of whom, how large, and whole or on their way.
 
     They come one after another, in pieces of one byte; there is room for eight bytes.
     """

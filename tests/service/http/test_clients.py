@@ -1,4 +1,4 @@
-"""Which client a request is counted for."""
+"""Each request is counted for its client."""
 
 from __future__ import annotations
 

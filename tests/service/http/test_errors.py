@@ -287,7 +287,7 @@ def test_503_while_the_service_drains(client: TestClient) -> None:
 
 
 def test_503_for_a_result_that_finds_no_room_and_it_still_waits_to_be_fetched() -> None:
-    """Who is told to come back finds it, though the service is shutting down."""
+    """A client that is told to come back finds its result, though the service is shutting down."""
     settings = Settings(workers=1, answer_bytes=9)
     app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
     with local(app, raise_server_exceptions=False) as client:

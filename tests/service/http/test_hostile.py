@@ -46,7 +46,7 @@ def status(answer):
 
 
 def is_served(address):
-    """Whether a client that means well is served."""
+    """Return whether a client that means well is served."""
     with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as connection:
         connection.request("POST", "/subdivide", b"honest", GLB)
         answer = connection.getresponse()

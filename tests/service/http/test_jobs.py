@@ -371,7 +371,7 @@ def test_jobs_that_were_cancelled_hold_nothing_and_are_no_more_than_results_may_
 
 
 def descriptors() -> int:
-    """How many memory files and deleted files this process holds."""
+    """Return how many memory files and deleted files this process holds."""
     return sum("(deleted)" in path for path in held())
 
 
@@ -381,7 +381,7 @@ def kept_in(folder: Path) -> list[str]:
 
 
 def held() -> list[str]:
-    """What this process has open."""
+    """Return the descriptors that this process has open."""
     paths = []
     for link in Path("/proc/self/fd").iterdir():
         # The server, which is in this process, may have closed it meanwhile.

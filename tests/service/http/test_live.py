@@ -1,4 +1,4 @@
-"""What only a real connection shows: slow and vanishing clients, and a server that stays awake."""
+"""Promises over real connections: slow and vanishing clients, a server that stays awake."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def answered(connection: http.client.HTTPConnection) -> tuple[int, bytes]:
 
 
 class Drained(NamedTuple):
-    """What clients were told by a server that had got SIGTERM, and how it ended."""
+    """The answers of a server to its clients after SIGTERM, and its exit."""
 
     default: list[str]
     late: tuple[int, bytes]

@@ -1,4 +1,4 @@
-"""What operators see: request ids, log lines, metrics."""
+"""Operators see request ids, log lines and metrics."""
 
 import json
 import logging
@@ -214,7 +214,7 @@ def metrics_port():
 
 
 def ends(connection):
-    """Whether the server ends a connection without a word."""
+    """Return whether the server ends a connection without a word."""
     try:
         return connection.recv(1) == b""
     except ConnectionResetError:

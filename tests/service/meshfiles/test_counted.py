@@ -1,4 +1,4 @@
-"""How many triangles a file is said to give, held against the files that are read."""
+"""The triangles that a file is said to give are those that are read."""
 
 from __future__ import annotations
 

@@ -216,7 +216,7 @@ def test_an_off_of_coloured_vertices_has_the_same_ones() -> None:
 
 @pytest.mark.parametrize("given", [b"vt 1e39 0\n", b"vt -1e39 0\n", b"vt nan 0\n", b"vt a 0\n"])
 def test_texture_coordinates_that_are_none_are_left_out_and_told(given: bytes) -> None:
-    """What float32 cannot hold, or is no number; what it can is kept."""
+    """Coordinates that float32 cannot hold, or that are no numbers, go; the others are kept."""
     text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n%bf 1/1 2/1 3/1\n"
     read = formats.read(text % given, "obj")
     fine, report = refined(read)

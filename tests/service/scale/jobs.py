@@ -35,7 +35,7 @@ class Numbered:
 
 
 def process_of(task: Numbered) -> int:
-    """Which process does a task."""
+    """Return the process that does a task."""
     with (task.folder / str(task.number)).open("a") as lines:
         lines.write(f"{os.getpid()}\n")
     return os.getpid()
@@ -50,7 +50,7 @@ def third_dies(task: Numbered) -> tuple[int, int]:
 
 
 def hears_interrupts(task: Numbered) -> bool:
-    """Whether Ctrl-C reaches a process, asked of the one that comes in place of a first."""
+    """Return whether Ctrl-C reaches a process, asked of the one that comes in place of a first."""
     if task.attempt == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])

@@ -1,4 +1,4 @@
-"""Where tasks are done: chunks of them, workers that die, clusters that cannot be had."""
+"""Engines: chunks of tasks, workers that die, clusters that cannot be had."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""What is known of a library's files outlives a run, and several runs at once."""
+"""Knowledge of a library's files outlives a run, and several runs at once."""
 
 import fcntl
 import json
@@ -25,7 +25,7 @@ def test_a_journal_knows_only_what_was_done_by_the_same_work(tmp_path):
 
 
 def locked(folder):
-    """Whether some run keeps others from the journals of a folder."""
+    """Return whether some run keeps others from the journals of a folder."""
     with (folder / ".pns-batch.journal-lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""What a batch works through: manifests, globs and folders, here and behind URLs."""
+"""Sources of a batch: manifests, globs and folders, here and behind URLs."""
 
 import errno
 import json

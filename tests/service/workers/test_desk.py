@@ -106,7 +106,7 @@ def desk_with_a_line(seconds: float) -> Desk:
 
 
 async def refused(desk: Desk, seconds: float) -> BusyError:
-    """What a job of a second is told, that is to be done within so many."""
+    """Return the refusal of a job of a second that is to be done within so many."""
     with MemoryFile() as answer:
         job = job_of(b"", answer, seconds=seconds)
         with pytest.raises(BusyError) as refusal:

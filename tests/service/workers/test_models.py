@@ -1,4 +1,4 @@
-"""Which models a worker has, by name, and what the catalogue says of them."""
+"""Models of a worker, by name, and their lines in the catalogue."""
 
 from __future__ import annotations
 

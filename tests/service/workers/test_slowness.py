@@ -1,4 +1,4 @@
-"""How fast the machine is, learnt from jobs that tell it, and from no single one."""
+"""The machine's speed is learnt from jobs that tell it, and from no single one."""
 
 from __future__ import annotations
 

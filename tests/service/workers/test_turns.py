@@ -1,4 +1,4 @@
-"""Whose turn it is: short jobs, fair shares, slots, and who leaves the line."""
+"""Turns in the line: short jobs, fair shares, slots, and clients who leave."""
 
 from __future__ import annotations
 

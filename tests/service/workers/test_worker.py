@@ -1,4 +1,4 @@
-"""What the one door for jobs leaves behind it."""
+"""The one door for jobs leaves nothing behind it."""
 
 import gc
 import weakref

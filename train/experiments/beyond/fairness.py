@@ -1,4 +1,4 @@
-"""How much more than Loop's a surface bends: ripples that the control mesh does not have."""
+"""Bending of a surface beyond Loop's: ripples that the control mesh does not have."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

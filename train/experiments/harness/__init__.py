@@ -1,1 +1,1 @@
-"""What experiments share: the laboratory, results that are kept, tables, figures, the page."""
+"""Shared parts of experiments: the laboratory, kept results, tables, figures, the page."""

@@ -1,4 +1,4 @@
-"""Who is compared everywhere: the untrained controls, Butterfly, Loop, and the default model.
+"""Methods that are compared everywhere: untrained controls, Butterfly, Loop, the default model.
 
 The default keeps crease lines sharp: what that alone gains stands beside it, by Loop and by N1 with
 the same lines, and what the rest gains, by the default without them.

@@ -1,4 +1,4 @@
-"""What an experiment is: a function of the laboratory whose tables and figures are data."""
+"""An experiment as a function of the laboratory; its tables and figures are data."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What an experiment found. Notes are Markdown paragraphs: above all, where it differs."""
+    """The result of an experiment. Notes are Markdown paragraphs: above all, where it differs."""
 
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()

@@ -1,4 +1,4 @@
-"""What experiments share: their scale, the data sets, trained networks, progress."""
+"""The laboratory of experiments: their scale, the data sets, trained networks, progress."""
 
 import hashlib
 from collections.abc import Callable
@@ -28,7 +28,7 @@ def silent(_text: str, _done: int, _of: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How much of an experiment is run.
+    """The amount of an experiment that is run.
 
     Attributes:
         name: on the page, where it is not the whole.
@@ -55,7 +55,7 @@ SMALL = Scale("small", instances=1, training_steps=2, levels=2, deepest=2, sampl
 
 @dataclass(frozen=True)
 class Laboratory:
-    """What an experiment may use.
+    """Everything that an experiment may use.
 
     Attributes:
         checkpoints: folder of networks to take as they are, by recipe name; what is missing there

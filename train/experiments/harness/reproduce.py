@@ -32,7 +32,7 @@ class FigureRecord:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a finished experiment found: all that the page needs.
+    """The result of a finished experiment: all that the page needs.
 
     Attributes:
         key: hash of all that the experiment was made from.

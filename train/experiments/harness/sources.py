@@ -1,4 +1,4 @@
-"""Which code a result depends on: a module and all of ours that it imports, at any depth."""
+"""The code that a result depends on: a module and all of ours that it imports, at any depth."""
 
 import ast
 from functools import cache

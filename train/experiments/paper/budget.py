@@ -1,4 +1,4 @@
-"""Where the budget is spent: per-edge proximity ratio on one ridge, and what it follows."""
+"""The spent budget: per-edge proximity ratio on one ridge, and the measures it follows."""
 
 from dataclasses import dataclass
 

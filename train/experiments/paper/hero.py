@@ -31,7 +31,7 @@ NOTES = (
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one panel shows."""
+    """The figures under one panel."""
 
     method: str = column("Method")
     level: int = column("Level")
@@ -43,7 +43,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """What one panel shows.
+    """The picture of one panel.
 
     Attributes:
         name: of the method.

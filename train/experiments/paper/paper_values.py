@@ -1,4 +1,4 @@
-"""What others report, for the columns beside ours; never shown as a measurement of ours.
+"""Values that others report, for the columns beside ours; never shown as a measurement of ours.
 
 `PAPER_…` is printed in the paper; `PUBLISHED_…` is printed in the CSV files of the author's
 repository, https://github.com/ugail/Proximity-Preserving-Neural-Subdivision (MIT License).

@@ -59,7 +59,7 @@ class ArchitectureRow:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What was published of one checkpoint on one data set.
+    """The published claim of one checkpoint on one data set.
 
     Attributes:
         percent: metric to published improvement.

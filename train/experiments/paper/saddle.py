@@ -30,7 +30,7 @@ NOTES = (
 
 @dataclass(frozen=True, slots=True)
 class GateRow:
-    """How far the gate opens on one data set."""
+    """The opening of the gate on one data set."""
 
     dataset: str = column("Data")
     mean_gate: float = column("Mean gate", ".4f")

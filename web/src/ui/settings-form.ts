@@ -126,6 +126,7 @@ export class SettingsForm {
     input("angle").value = String(settings.angle);
     select("uv").value = settings.uv;
     input("weld").checked = settings.weld;
+    input("polygons").checked = settings.polygons;
     select("normals").value = settings.normals;
     this.adjust();
   }
@@ -146,6 +147,7 @@ export class SettingsForm {
       angle: angle.validity.valid ? Number(angle.value || DEFAULTS.angle) : before.angle,
       uv: select("uv").value as Settings["uv"],
       weld: input("weld").checked,
+      polygons: input("polygons").checked,
       normals: select("normals").value as Settings["normals"],
     };
     // Each model has its own budget.

@@ -27,7 +27,7 @@ def shown_mesh(obj):
 
 
 def settle():
-    """What Blender's timer does in the seconds after an edit, at once."""
+    """Run at once what Blender's timer does in the seconds after an edit."""
     bpy.context.view_layer.update()
     for _ in range(100):
         if WATCH.run is not None:

@@ -38,7 +38,7 @@ def test_disabling_leaves_nothing_behind():
 
 
 def traces():
-    """What Blender knows of the extension."""
+    """Return what Blender knows of the extension."""
     handlers = [
         h
         for group in dir(bpy.app.handlers)

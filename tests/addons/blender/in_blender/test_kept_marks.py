@@ -112,7 +112,7 @@ def mark_for_freestyle(mesh, edges):
 
 
 def freestyle_marks(mesh):
-    """Whether edges are marked for Freestyle."""
+    """Return whether edges are marked for Freestyle."""
     if hasattr(mesh.edges[0], "use_freestyle_mark"):
         return [e.use_freestyle_mark for e in mesh.edges]
     return [row.value for row in mesh.attributes["freestyle_edge"].data]
@@ -133,7 +133,7 @@ def test_what_is_in_hidden_faces_is_hidden(levels):
 
 
 def hidden_around(mesh):
-    """Which edges, and which vertices, have hidden faces alone."""
+    """Return masks of the edges, and of the vertices, that have hidden faces alone."""
     edges, points = [True] * len(mesh.edges), [True] * len(mesh.vertices)
     for face in mesh.polygons:
         for corner in [] if face.hide else face.loop_indices:
@@ -287,7 +287,7 @@ def test_every_loss_is_named():
 
 
 def notes(obj):
-    """What the panel says is lost."""
+    """Return what the panel says is lost."""
     import json
 
     return json.loads(obj.data.pns_result.notes)

@@ -1,4 +1,4 @@
-"""What hangs on points, edges, faces and corners, where it comes from and what it becomes."""
+"""Values on points, edges, faces and corners: each comes from its place and goes to it."""
 
 from dataclasses import replace
 

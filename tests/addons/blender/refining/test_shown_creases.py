@@ -16,7 +16,7 @@ LINES = Creases(angle=66.0, levels=2)
 
 
 def hard_edges_alone(shape):
-    """What is kept where nothing turns so much that it is a line."""
+    """Return what is kept where nothing turns so much that it is a line."""
     return shown(shape, keeping(Creases(angle=179.0))).named
 
 

@@ -1,4 +1,4 @@
-"""What a file claims costs nothing: compressed and sparse data are refused before they allocate."""
+"""A file's claims cost nothing: compressed and sparse data are refused before they allocate."""
 
 import json
 import tracemalloc

@@ -1,4 +1,4 @@
-"""What a file would cost is known before it is paid; float32 and buffers end somewhere."""
+"""The cost of a file is known before it is paid; float32 and buffers end somewhere."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""How many triangles a number of corners makes, and which it cannot make."""
+"""Each mode makes as many triangles of its corners as the specification says, or is refused."""
 
 import pytest
 

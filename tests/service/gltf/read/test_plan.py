@@ -1,4 +1,4 @@
-"""What the prediction of memory must not leave out."""
+"""The prediction of memory leaves nothing out."""
 
 import json
 import tracemalloc

@@ -28,7 +28,7 @@ def sheet(height=0.0):
 
 
 def averaged(shape, weights):
-    """What an exporter makes of faces: a normal for each vertex, of normals weighted by them."""
+    """Return a normal for each vertex as exporters make it: the weighted mean of its faces'."""
     normals = np.zeros((len(shape["POSITION"]), 3))
     for face in shape["indices"]:
         corners = shape["POSITION"][face]

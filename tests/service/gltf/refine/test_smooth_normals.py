@@ -157,7 +157,7 @@ def flat_box():
 
 
 def directions(primitive):
-    """How many different normals the richest place has."""
+    """Return how many different normals the richest place has."""
     places = np.round(primitive["POSITION"], 6) + 0.0
     _, which = np.unique(places, axis=0, return_inverse=True)
     normals = np.round(primitive["NORMAL"], 4) + 0.0

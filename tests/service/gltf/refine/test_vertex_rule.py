@@ -34,7 +34,7 @@ def corners(result, name="POSITION"):
 
 
 def departure(result, by_loop):
-    """How far each corner of each face is from Loop's."""
+    """Return how far each corner of each face is from Loop's."""
     return np.linalg.norm(corners(result) - corners(by_loop).astype(np.float64), axis=-1)
 
 
@@ -45,7 +45,7 @@ def welded_octahedron():
 
 
 def is_old(faces, levels):
-    """Which corners of the refined faces are vertices of the level before the last."""
+    """Return which corners of the refined faces are vertices of the level before the last."""
     # The children of a face begin with its three corners; the fourth has none of them.
     old = np.zeros((faces * 4**levels, 3), dtype=bool)
     old[:, 0] = np.arange(len(old)) % 4 < 3

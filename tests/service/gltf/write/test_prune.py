@@ -1,4 +1,4 @@
-"""What refinement has replaced leaves the file; what it has not touched stays, byte for byte."""
+"""Data that refinement has replaced leave the file; the others stay, byte for byte."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""What is written of refined geometry: the narrowest indices that restart no primitive."""
+"""Refined geometry is written with the narrowest indices that restart no primitive."""
 
 import numpy as np
 import pytest

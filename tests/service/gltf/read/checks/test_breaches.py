@@ -90,7 +90,7 @@ def test_even_strides_are_no_breach(stride):
 
 
 def first_rows(attributes):
-    """Which old vertex each of the first six refined ones is: those that lie on its axis."""
+    """Return the old vertex that each of the first six refined ones is: that of its axis."""
     points = attributes["POSITION"][:6]
     old = octahedron()["POSITION"]
     return (points @ old.T).argmax(axis=1)

@@ -1,4 +1,4 @@
-"""What a file promises of its Draco data and does not keep is told at its place."""
+"""A promise about Draco data that a file does not keep is told at its place."""
 
 import json
 
@@ -21,7 +21,7 @@ EXTENSION = f"{PRIMITIVE}/extensions/KHR_draco_mesh_compression"
 
 
 def refusal(change):
-    """What is said of a box whose JSON was changed; `change` gets tree, primitive and extension."""
+    """Return the refusal of a box with other JSON; `change` gets tree, primitive and extension."""
     tree, packed = draco()
     primitive = tree["meshes"][0]["primitives"][0]
     change(tree, primitive, primitive["extensions"]["KHR_draco_mesh_compression"])
