@@ -8,36 +8,37 @@ the corners are kept that `pns_common.selection` keeps.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Int
 
+from pns_common.columns import level_topologies
 from pns_common.creases import Creases
-from pns_common.errors import MeshError
 from pns_common.mesh import Mesh, fans
 from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine
+from pns_common.report import Report
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
-from pns_common.selection import Selected
-from pns_common.topology import EdgeClass, Topology, build_topology, following
+from pns_common.topology import EdgeClass, following
 
-from ..advice import count_bends
+from ..advice import Bends, count_bends
 from ..course import Course
 from ..errors import UnrefinableError
+from ..gltf.refine.attributes import in_type_of
 from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.near_misses import near_miss_changes, near_misses
 from ..gltf.refine.normals import safe_unit
+from ..gltf.refine.polygons import PolygonSplit
 from ..meshes.shape_creases import creases_by_shape
+from ..meshes.uv_charts import refined_charts
 from ..meshes.weld import Weld, weld, weld_by_label
 from ..meshes.weld_tolerance import weld_within
-from ..options import Limits, Options
-from ..report import Change, MeshResult, build_report
+from ..options import Options
+from ..report import Change
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
-from .parts import chosen_of, with_group_normals
-from .refine_mesh_file import check_cost
+from .parts import chosen_of
 from .triangulate import cut_blocks
 
 # All four triangles of a quad: its normal does not depend on a diagonal.
@@ -63,56 +64,82 @@ class _Control:
     near: int
 
 
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A refined mesh file.
+
+    Attributes:
+        mesh: the mesh.
+        corners: vertices of the file that were refined, one or more times each.
+        primitives: how many it was refined as.
+        degenerate: number of faces without three different vertices.
+        copies: number of faces with the vertices of an earlier face.
+        report: the operator's.
+        bends: bent edges, and the sharp ones among them.
+        changes: what was joined or dropped.
+    """
+
+    mesh: MeshFile
+    corners: Int[np.ndarray, " C"]
+    primitives: int
+    degenerate: int
+    copies: int
+    report: Report
+    bends: Bends
+    changes: list[Change]
+
+
 def refine_polygons(
-    mesh: MeshFile,
-    scheme: Scheme,
-    options: Options,
-    limits: Limits,
-    course: Course,
-    *,
-    traced: bool = False,
-) -> tuple[MeshFile, dict[str, Any]]:
-    """Refine polygons; return also the report. `traced` asks for the parents of vertices.
+    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+) -> Refined:
+    """Refine polygons; `traced` asks for the parents of vertices.
 
     Raises:
-        LimitError: over `max_faces` or `max_memory_bytes`.
-        UnrefinableError: no face of three different vertices, or one that cannot be refined.
+        MeshError: a face cannot be refined.
+        UnrefinableError: no face of three different vertices.
     """
-    check_cost(mesh, options, limits)
-    shaded = with_group_normals(mesh)
     with course.stage("weld", 0.0, 0.1):
-        control = _control(shaded, options)
-        creases = _creases(control, shaded, options, scheme)
+        control = _control(mesh, options)
+        creases = _creases(control, mesh, options, scheme)
     picked = chosen_of(mesh, options)
     if picked is not None:
         picked = picked[control.faces]
         if not picked.any():
             raise UnrefinableError("no chosen face has three different vertices")
     with course.stage("refine", 0.1, 0.7):
-        try:
-            made = refine(
-                control.mesh,
-                scheme,
-                options.levels,
-                options.reference_length,
-                limit=options.limit,
-                creases=creases,
-                faces=picked,
-                progress=lambda done, total: course.reach(done / total),
-            )
-        except MeshError as error:
-            raise UnrefinableError(str(error)) from error
+        made = refine(
+            control.mesh,
+            scheme,
+            options.levels,
+            options.reference_length,
+            limit=options.limit,
+            creases=creases,
+            faces=picked,
+            progress=lambda done, total: course.reach(done / total),
+        )
     with course.stage("attributes", 0.7, 1.0):
-        refined = _with_layers(shaded, control, made, options)
-        if NORMAL not in mesh.layers and options.normals in ("auto", "keep"):
-            layers = {name: own for name, own in refined.layers.items() if name != NORMAL}
-            refined = replace(refined, layers=layers)
-    parents = None
+        refined = _with_layers(mesh, control, creases, made, options)
     if traced:
-        parents = made.parents
-        shape = (parents.shape[0], len(mesh.vertices))
+        parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
-    return replace(refined, parents=parents), _report(mesh, control, creases, made, options)
+        refined = replace(refined, parents=parents)
+    (misses,) = near_misses(control.mesh, [made.reference_length])
+    told = {
+        "vertices joined within weld_tolerance": control.near,
+        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
+    }
+    changes = [Change("", what, count) for what, count in told.items() if count]
+    refined_faces = np.isin(np.repeat(np.arange(len(mesh.sizes)), mesh.sizes), control.faces)
+    return Refined(
+        mesh=refined,
+        corners=mesh.corners[refined_faces],
+        primitives=1,
+        degenerate=len(mesh.sizes) - len(control.faces),
+        copies=0,
+        report=made.report,
+        bends=count_bends(control.mesh, creases)[0],
+        changes=[*changes, *near_miss_changes(misses, "")],
+    )
 
 
 def _control(mesh: MeshFile, options: Options) -> _Control:
@@ -128,10 +155,7 @@ def _control(mesh: MeshFile, options: Options) -> _Control:
     places = np.flatnonzero(kept)
     number, first = number_by_first_appearance(corner[places])
     points = welded.points[corner[places[first]]]
-    try:
-        made = Mesh(points, (number, offsets_of(sizes[faces])))
-    except MeshError as error:
-        raise UnrefinableError(str(error)) from error
+    made = Mesh(points, (number, offsets_of(sizes[faces])))
     return _Control(made, places, faces, mesh.corners[places[first]], near)
 
 
@@ -172,27 +196,32 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
     return edges[hard]
 
 
-def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
+def _with_layers(
+    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
+) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners, selected = made.mesh.corners, made.selected
     counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
     of_face = np.repeat(control.faces, counts)
+    layers: dict[str, Layer] = {}
+    for name, layer in mesh.layers.items():
+        layers[name] = _refined(name, layer, control, creases, options)
     still = np.zeros(0, dtype=np.int64)
     if selected is not None:
         of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
         still = np.flatnonzero(np.isin(corners, np.flatnonzero(selected.still)))
-    layers: dict[str, Layer] = {}
-    for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, options, selected)
+        source = control.places[selected.places[still] // 4**options.levels]
+        for name, layer in mesh.layers.items():
+            layers[name] = _kept(layers[name], selected.places, still, layer, source)
     if options.normals == "smooth":
         layers[NORMAL] = _smooth_normals(made)
     elif NORMAL in layers:
         before = layers[NORMAL]
-        layers[NORMAL] = _with(_normals(made.mesh, before.rows), before, still)
+        layers[NORMAL] = _with(_normals(made.mesh, before.rows), still, before, still)
     if made.normals is not None and options.normals == "limit":
         layers[NORMAL] = Layer(made.normals, corners)
         if len(still):
-            layers[NORMAL] = _with(layers[NORMAL], _normals(made.mesh, corners), still)
+            layers[NORMAL] = _with(layers[NORMAL], still, _normals(made.mesh, corners), still)
     if options.diagnostics == "full":
         scalars = {RATIO: made.ratio, GATE: made.gate}
         layers |= {
@@ -210,62 +239,58 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
     )
 
 
-def _with(layer: Layer, other: Layer, corners: Int[np.ndarray, " N"]) -> Layer:
-    """Return a layer with the directions that another one has at some corners."""
-    corners = corners[other.rows[corners] >= 0]
+def _kept(
+    layer: Layer,
+    places: Int[np.ndarray, " H"],
+    still: Int[np.ndarray, " N"],
+    before: Layer,
+    source: Int[np.ndarray, " N"],
+) -> Layer:
+    """Return a layer at `places`; corners that stay have the values of `before` at `source`."""
+    made = _with(Layer(layer.values, layer.rows[places]), still, before, source)
+    used = np.unique(made.rows[made.rows >= 0])
+    rows = np.where(made.rows >= 0, np.searchsorted(used, made.rows), NONE)
+    return Layer(made.values[used], rows)
+
+
+def _with(
+    layer: Layer, at: Int[np.ndarray, " N"], other: Layer, source: Int[np.ndarray, " N"]
+) -> Layer:
+    """Return a layer with the values at some corners that another one has at `source`."""
+    rows, theirs = layer.rows[at], other.rows[source]
+    both = (rows >= 0) & (theirs >= 0)
+    if not both.any():
+        return layer
     values = np.array(layer.values)
-    values[layer.rows[corners]] = safe_unit(other.values[other.rows[corners]])
+    values[rows[both]] = other.values[theirs[both]]
     return Layer(values, layer.rows)
 
 
 def _refined(
-    name: str, layer: Layer, control: _Control, options: Options, selected: Selected | None
+    name: str, layer: Layer, control: _Control, creases: Creases, options: Options
 ) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
     values, offsets = layer.values, control.mesh.offsets
     bare = np.logical_or.reduceat(rows < 0, offsets[:-1])
-    label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
-    number, first = number_by_first_appearance(label)
-    column = given = values[np.maximum(rows[first], 0)]
-    topology = build_topology((number, offsets), len(first))
-    for depth in range(options.levels):
-        if depth:
-            topology = CATMULL_CLARK.split(topology, Blocks())
-        column = _placed(name, column, topology, smooth=name == UV and options.uv == "smooth")
-    corners = CATMULL_CLARK.faces(topology, Blocks(), np.int64).reshape(-1)
+    if name == UV and options.uv == "smooth":
+        asked = values[np.maximum(rows, 0)], control.mesh.corners, offsets, options.levels
+        column, corners = refined_charts(*asked, creases, CATMULL_CLARK)
+    else:
+        label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
+        number, first = number_by_first_appearance(label)
+        column = values[np.maximum(rows[first], 0)]
+        whole, faces = column.dtype.kind != "f" and name != COLOUR, (number, offsets)
+        levels = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
+        for split in map(PolygonSplit, levels):
+            column = split.nearest(column) if whole else split.linear(column)
+        corners = PolygonSplit(levels[-1]).quads
+    corners = corners.reshape(-1)
     if bare.any():
         counts = 4 * np.diff(offsets) * 4 ** (options.levels - 1)
         corners = np.where(np.repeat(bare, counts), NONE, corners)
-    if column.dtype != values.dtype:
-        column = np.rint(column) if values.dtype.kind in "ui" else column
-    if selected is not None:
-        still = np.flatnonzero(selected.still[control.mesh.corners[first]])
-        column[still], corners = given[still], corners[selected.places]
-        used = np.unique(corners[corners >= 0])
-        column = column[used]
-        corners = np.where(corners >= 0, np.searchsorted(used, corners), NONE)
-    return Layer(column.astype(values.dtype), corners)
-
-
-def _placed(
-    name: str, column: Shaped[np.ndarray, "N K"], mesh: Topology, *, smooth: bool
-) -> Shaped[np.ndarray, "M K"]:
-    """Return values at old vertices, edges and faces: linear, or those of whole numbers."""
-    a, b = mesh.edges.T
-    starts = mesh.offsets[:-1]
-    if column.dtype.kind != "f" and name != COLOUR:
-        return np.concatenate([column, column[a], column[mesh.corners[starts]]])
-    column = column.astype(np.float64)
-    if smooth:
-        rim = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)
-        made = CATMULL_CLARK.place(column, mesh, Blocks(available_threads()))
-        made[rim] = column[rim]
-        return made
-    sums = np.add.reduceat(column[mesh.corners], starts, axis=0)
-    return np.concatenate(
-        [column, (column[a] + column[b]) / 2, sums / np.diff(mesh.offsets)[:, None]]
-    )
+    column = column if column.dtype == values.dtype else in_type_of(values, column)
+    return Layer(column, corners)
 
 
 def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
@@ -309,34 +334,3 @@ def _smooth_normals(made: Refinement) -> Layer:
     # Of two triangles at a corner the first counts.
     groups[places[::-1]] = made_fans[::-1]
     return _normals(mesh, groups)
-
-
-def _report(
-    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
-) -> dict[str, Any]:
-    (misses,) = near_misses(control.mesh, [made.reference_length])
-    told = {
-        "vertices joined within weld_tolerance": control.near,
-        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
-    }
-    changes = [*mesh.changes, *(Change("", what, count) for what, count in told.items() if count)]
-    used = len(np.unique(mesh.corners))
-    lost = used - len(np.unique(mesh.corners[np.isin(_faces_of(mesh), control.faces)]))
-    result = MeshResult(
-        index=0,
-        instances=1,
-        primitives=1,
-        vertices=len(made.mesh.vertices),
-        faces=made.mesh.face_count,
-        degenerate=len(mesh.sizes) - len(control.faces),
-        copies=0,
-        report=made.report,
-        bends=count_bends(control.mesh, creases)[0],
-    )
-    changes += near_miss_changes(misses, "")
-    return build_report(made.scheme, options.levels, [result], lost, changes)
-
-
-def _faces_of(mesh: MeshFile) -> Int[np.ndarray, " C"]:
-    """Return the face of each corner."""
-    return np.repeat(np.arange(len(mesh.sizes)), mesh.sizes)

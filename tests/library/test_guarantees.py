@@ -20,7 +20,7 @@ from tests.support.meshes import (
     tilted_plane,
 )
 from tests.support.networks import Float64Model, huge_model, random_layers, random_model
-from train.certificates.plain_loop import plain_loop
+from train.certificates.plain import plain_loop
 
 MODELS = [random_model(0), random_model(1, scale=30.0), huge_model(2)]
 models = st.sampled_from(MODELS)

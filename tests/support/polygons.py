@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from pns_common import Mesh
+from train.spectra import stars
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 CUBE_FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -36,24 +37,8 @@ def quad_grid(n=5, height=None):
 
 def quad_star(k, rings=2):
     """k sectors of quads around vertex 0, whose rings are complete; sector j has rings² quads."""
-    number, points, faces = {}, [], []
-
-    def at(j, a, b):
-        # Point a along spoke j and b along the next; on a spoke it belongs to two sectors.
-        key = (0, 0, 0) if a == b == 0 else ((j + 1) % k, b, 0) if a == 0 else (j, a, b)
-        if key not in number:
-            number[key] = len(points)
-            first, second = (2 * np.pi * (j + side) / k for side in (0, 1))
-            x, y = (a * turn(first) + b * turn(second) for turn in (np.cos, np.sin))
-            points.append([x, y, 0])
-        return number[key]
-
-    at(0, 0, 0)
-    for j in range(k):
-        for a, b in np.ndindex(rings, rings):
-            corners = (a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)
-            faces.append([at(j, *corner) for corner in corners])
-    return np.array(points, dtype=float), np.array(faces)
+    mesh = stars.quad_star(k, rings, 1.0).mesh
+    return mesh.vertices, mesh.faces
 
 
 def cylinder(sides=7, height=2.0):

@@ -18,6 +18,7 @@ from train.certificates.affine import TURNED
 from train.certificates.bodies import bumpy_sphere, random_motion
 from train.certificates.displacement import AT_MOST, worst_ratio
 from train.certificates.equivariance import EXACT, well_conditioned
+from train.certificates.plain import plain_loop
 from train.connectivity import Connectivity, connect
 from train.data.datasets import grid_faces, jittered_grid
 from train.fitting.determinism import deterministic
@@ -114,7 +115,8 @@ def proximity_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
         # A soft maximum: every edge gets a gradient, the leading ones the most.
         objective = torch.logsumexp(20 * step.ratio[len(points) + level.interior], dim=0)
         control, refined = _mesh(points, mesh), step.points.detach().numpy()
-        ratio, _ = worst_ratio(control, refined, recipe.budget)
+        base = plain_loop(control.vertices, control.faces)
+        ratio, _ = worst_ratio(control, refined, recipe.budget, base)
         return objective, ratio
 
     values = ascend([points, *operator.weights], look, steps, on_step)

@@ -1,17 +1,15 @@
-"""T3, affine reproduction: on a plane the scheme is Loop."""
+"""T3, affine reproduction: on a plane the scheme is its base."""
 
 from collections.abc import Sequence
 
 import numpy as np
-import torch
 
 from pns_common import Mesh
+from train.certificates.bases import LOOP
 from train.certificates.bodies import Body, random_motion
-from train.certificates.plain_loop import plain_loop
-from train.certificates.step import Step, step
+from train.certificates.step import step
 from train.certificates.subject import Certificate, Subject, worst
-from train.curve_rule import Curves
-from train.refining import loop_like, refine
+from train.refining import AnyScheme, loop_like, refine
 
 LEVELS = 2
 
@@ -36,50 +34,49 @@ def _aligned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
     for body in flat:
         for axis, name in enumerate(("z", "x", "y")):
             lifted = body.mesh.vertices + np.array([0, 0, rng.uniform(-1, 1)])
-            mesh = Mesh(np.roll(lifted, axis, axis=1), body.mesh.faces)
-            off = _off_loop(subject, mesh, axis)
+            mesh = Mesh(np.roll(lifted, axis, axis=1), body.mesh.polygons)
+            off = _off_base(subject, mesh, axis)
             measured.append((off, f"{body.name}, {name} constant"))
     value, place = worst(measured)
     return Certificate("T3", "affine reproduction, axis-aligned", value, 0.0, 0.0, place)
 
 
-def _off_loop(subject: Subject, mesh: Mesh, axis: int) -> float:
-    """Return how far planar refinements are from Loop's; but for boundaries where these move.
+def _off_base(subject: Subject, mesh: Mesh, axis: int) -> float:
+    """Return how far planar refinements are from the base's; but for boundaries where these move.
 
     These stay in the plane: there the coordinate across it is compared, everything else at the
     first level.
     """
     refined, base = (
         refine(mesh, rules, LEVELS, 1.0, creases="auto").mesh.vertices
-        for rules in (subject.scheme, loop_like(subject.scheme))
+        for rules in (subject.scheme, _base_of(subject))
     )
     if not subject.moves_curves:
         return float(np.abs(refined - base).max())
     across = (axis + 2) % 3
-    first, plain = (
-        step(rules, mesh).positions for rules in (subject.scheme, loop_like(subject.scheme))
-    )
-    inside = ~_on_curves(step(subject.scheme, mesh))
+    first, plain = (step(rules, mesh).positions for rules in (subject.scheme, _base_of(subject)))
+    inside = subject.base.plain(mesh.vertices, mesh.polygons).curve_reach == 0
     out_of_plane = np.abs(refined[:, across] - base[:, across]).max()
     return float(max(np.abs(first - plain)[inside].max(initial=0), out_of_plane))
 
 
-def _on_curves(made: Step) -> np.ndarray:
-    curves = Curves(made.level, torch.tensor(made.mesh.vertices))
-    return ((curves.shares > 0) | curves.of_boundary).numpy()
+def _base_of(subject: Subject) -> AnyScheme:
+    """Return the base by the code that runs the scheme, with its rounding."""
+    return loop_like(subject.scheme) if subject.base is LOOP else subject.base.scheme
 
 
 def _turned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:
     rng, measured = np.random.default_rng(seed), []
     for body in flat:
         turn, _ = random_motion(rng)
-        mesh = Mesh(body.mesh.vertices @ turn.T, body.mesh.faces)
-        made, reach = step(subject.scheme, mesh), plain_loop(mesh.vertices, mesh.faces).reach
-        size = made.added(subject.budget * reach**2)
+        mesh = Mesh(body.mesh.vertices @ turn.T, body.mesh.polygons)
+        plain = subject.base.plain(mesh.vertices, mesh.polygons)
+        envelope = subject.budget * plain.reach**2
+        size = step(subject.scheme, mesh).added(subject.base.scheme, envelope)
         if subject.moves_curves:
-            size = size[~_on_curves(made)]
+            size = size[plain.curve_reach == 0]
         power = 2 if subject.learned_once is None else 1
-        measured.append((float(size.max() / reach.max() ** power), body.name))
+        measured.append((float(size.max() / plain.reach.max() ** power), body.name))
     value, place = worst(measured)
     allowed = TURNED if subject.learned_once is None else TURNED_IN_EDGE_LENGTHS
     return Certificate("T3", "affine reproduction, any plane", value, high=allowed, where=place)

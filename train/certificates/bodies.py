@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from pns_common import Mesh, MeshError, clean
 from pns_common.reference_length import measure_reference_length
 from train.data.datasets import draw_ridges, grid_faces, jittered_grid
-from train.spectra.stars import star
+from train.spectra.stars import quad_star, star
 
 MESH_ENDINGS = (".obj", ".off", ".ply", ".stl")
 
@@ -23,6 +23,53 @@ class Body:
 
     name: str
     mesh: Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """The meshes that rules over one base scheme are certified on.
+
+    Attributes:
+        shaped: of many kinds of vertices and faces, well-shaped.
+        flat: in the plane z = 0, none folded.
+        rough: one that would fold without a guard.
+        regular: closed, and every vertex regular.
+    """
+
+    shaped: tuple[Body, ...]
+    flat: tuple[Body, ...]
+    rough: Body
+    regular: Mesh
+
+
+def triangle_bodies(seed: int) -> Bodies:
+    """Return the meshes for rules over Loop."""
+    rough = Body("spiky sphere", spiky_sphere(seed))
+    return Bodies(synthetic_bodies(seed), flat_bodies(seed), rough, bumpy_torus(seed))
+
+
+def polygon_bodies(seed: int) -> Bodies:
+    """Return the meshes for rules over Catmull–Clark."""
+    rng, halves, torus = np.random.default_rng(seed), paraboloid(seed), quad_torus(seed)
+    quads = halves.faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
+
+    def shaken(mesh: Mesh, by: float) -> Mesh:
+        noise = by * rng.standard_normal(mesh.vertices.shape)
+        return Mesh(mesh.vertices + noise, mesh.polygons)
+
+    return Bodies(
+        shaped=(
+            Body("paraboloid", Mesh(halves.vertices, quads)),
+            Body("torus", shaken(torus, 0.06)),
+            Body("prism", shaken(capped_prism(7), 0.06)),
+        ),
+        flat=(
+            Body("flat grid", Mesh(halves.vertices * [1, 1, 0], quads)),
+            *(Body(f"flat star {k}", quad_star(k, 2, 0.5).mesh) for k in (3, 7, 12)),
+        ),
+        rough=Body("spiky torus", shaken(torus, 0.3)),
+        regular=torus,
+    )
 
 
 def synthetic_bodies(seed: int) -> tuple[Body, ...]:
@@ -64,6 +111,13 @@ def spiky_sphere(seed: int) -> Mesh:
 
 def bumpy_torus(seed: int) -> Mesh:
     """Return a torus of 12 × 6 quads, halved: closed and every vertex regular."""
+    whole = quad_torus(seed)
+    halves = np.concatenate([whole.faces[:, [0, 1, 2]], whole.faces[:, [0, 2, 3]]])
+    return Mesh(whole.vertices, halves)
+
+
+def quad_torus(seed: int) -> Mesh:
+    """Return a torus of 12 × 6 quads: closed and every vertex regular."""
     around, across = 12, 6
     u, v = (axis.ravel() for axis in np.mgrid[:around, :across])
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, 2)
@@ -75,9 +129,18 @@ def bumpy_torus(seed: int) -> Mesh:
     def number(i: Int[np.ndarray, " N"], j: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
         return (i % around) * across + j % across
 
-    quad = [number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)]
-    faces = [np.stack([quad[0], quad[1], quad[2]], -1), np.stack([quad[0], quad[2], quad[3]], -1)]
-    return Mesh(points, np.concatenate(faces).astype(np.int64))
+    quads = [number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)]
+    return Mesh(points, np.stack(quads, axis=-1))
+
+
+def capped_prism(sides: int) -> Mesh:
+    """Return a prism with a polygon at one end and a pyramid of triangles at the other."""
+    angle, i = 2 * np.pi * np.arange(sides) / sides, np.arange(sides)
+    ring, after = np.stack([np.cos(angle), np.sin(angle)], axis=1), (i + 1) % sides
+    ends = [np.column_stack([ring, np.full(sides, z)]) for z in (-0.5, 0.5)]
+    walls = np.stack([i, after, sides + after, sides + i], axis=1).tolist()
+    roof = np.stack([sides + i, sides + after, np.full(sides, 2 * sides)], axis=1).tolist()
+    return Mesh(np.concatenate([*ends, [[0, 0, 1.0]]]), [i[::-1].tolist(), *walls, *roof])
 
 
 def flat_bodies(seed: int) -> tuple[Body, ...]:

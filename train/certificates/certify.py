@@ -12,9 +12,9 @@ from rich.table import Table
 
 from pns_common import ModelError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
-from pns_common.schemes import CATMULL_CLARK
 from train.certificates.affine import affine_reproduction
-from train.certificates.bodies import Body, flat_bodies, spiky_sphere, synthetic_bodies
+from train.certificates.bases import LOOP
+from train.certificates.bodies import Body, polygon_bodies, triangle_bodies
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
@@ -27,7 +27,6 @@ from train.certificates.learned_once import (
 )
 from train.certificates.model_file import keeps_its_word
 from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
-from train.certificates.polygons import polygon_steps
 from train.certificates.scaling import (
     lipschitz_slope,
     normal_variation_slope,
@@ -102,37 +101,33 @@ def certify_model_file(
 def scheme_steps(
     subject: Subject, real: Sequence[Body], seed: int, valences: Sequence[int]
 ) -> list[Step]:
-    """Return the certificates of a scheme, ready to run.
-
-    A scheme over Catmull–Clark is tried on polygons of its own.
-    """
-    if subject.card is not None and subject.card.base == CATMULL_CLARK.name:
-        return [Step(*step) for step in polygon_steps(subject, seed, valences)]
-    shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
-    every = (*shaped, *real)
+    """Return the certificates of a scheme, ready to run."""
+    bodies = triangle_bodies(seed) if subject.base is LOOP else polygon_bodies(seed)
+    every = (*bodies.shaped, *real)
+    shaped = bodies.shaped
     return [
         Step("T1", "bounded displacement", lambda: bounded_displacement(subject, every, seed=seed)),
         Step("T2", "equivariance", lambda: equivariance(subject, every, seed)),
-        Step("T3", "affine reproduction", lambda: affine_reproduction(subject, flat, seed)),
+        Step("T3", "affine reproduction", lambda: affine_reproduction(subject, bodies.flat, seed)),
         Step("T4", "proximity slope", lambda: proximity_slope(subject, every)),
-        Step("T5", "regular regions", lambda: regular_smoothness(subject, seed)),
+        Step("T5", "regular regions", lambda: regular_smoothness(subject, bodies.regular)),
         Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
         Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
         Step("T8", "planar spectrum", lambda: planar_spectrum(subject, valences)),
-        *_steps_of_kind(subject, every, seed, valences),
+        *_steps_of_kind(subject, every, bodies.rough, seed, valences),
     ]
 
 
 def _steps_of_kind(
-    subject: Subject, bodies: Sequence[Body], seed: int, valences: Sequence[int]
+    subject: Subject, bodies: Sequence[Body], rough_body: Body, seed: int, valences: Sequence[int]
 ) -> list[Step]:
     """Return the certificates that a kind of scheme has.
 
-    Schemes that turn into Loop have its spectra; of others lifted stars say more.
+    Schemes that turn into their base have its spectra; of others lifted stars say more.
     """
     if subject.learned_once is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
-    rough = (*bodies, Body("spiky sphere", spiky_sphere(seed)))
+    rough = (*bodies, rough_body)
     return [
         Step("folds", "fold-free", lambda: fold_free(subject, rough, seed)),
         Step("turns", "turns of neighbours", lambda: neighbour_turns(subject, rough, seed)),

@@ -1,10 +1,10 @@
-"""T1, bounded displacement: no vertex leaves Loop's by more than C h² / R.
+"""T1, bounded displacement: no vertex leaves the base scheme's by more than C h² / R.
 
-h is the edge's length at an edge vertex, and the root mean square edge around an old vertex;
-irregular edges, and the vertices on them, are not moved at all, nor are boundaries and creases but
-by a rule of their own, within the lengths of their own edges. The theorem is about what is added to
-Loop with the same creases: with none, and with a quarter of all edges, whichever they are. So no
-creases are looked for.
+h is the edge's length at an edge vertex, and the root mean square edge around an old vertex or of a
+face; irregular edges, and the vertices on them, are not moved at all, nor are boundaries and
+creases but by a rule of their own, within the lengths of their own edges. The theorem is about what
+is added to the base scheme with the same creases: with none, and with a quarter of all edges,
+whichever they are. So no creases are looked for.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from pns_common import Mesh
 from train.certificates.bodies import Body
-from train.certificates.plain_loop import plain_loop
+from train.certificates.plain import PlainStep
 from train.certificates.step import NO_CREASES, rounding, trials
 from train.certificates.subject import Certificate, Subject, worst
 from train.refining import refine
@@ -28,7 +28,7 @@ AT_MOST = 1 + 1e-12
 def bounded_displacement(
     subject: Subject, bodies: Sequence[Body], levels: int = 3, seed: int = 0
 ) -> Certificate:
-    """Certify T1 from output positions and an independent Loop, at every level; R is 1.
+    """Certify T1 from output positions and an independent base, at every level; R is 1.
 
     The value is the largest proximity ratio; positions may be off by their rounding.
     """
@@ -37,7 +37,7 @@ def bounded_displacement(
         ratio, place, mesh = _one_step(subject, trial.mesh, trial.creases)
         measured.append((ratio, f"{trial.name}, {place}"))
         for level in range(2, levels + 1):
-            if len(trial.creases) or len(mesh.faces) > LARGEST:
+            if len(trial.creases) or mesh.face_count > LARGEST:
                 break
             ratio, place, mesh = _one_step(subject, mesh, NO_CREASES)
             measured.append((ratio, f"{trial.name}, level {level}, {place}"))
@@ -50,8 +50,9 @@ def _one_step(
 ) -> tuple[float, str, Mesh]:
     """Refine once; return the largest ratio, at which vertex, and the refined mesh."""
     refined = refine(mesh, subject.scheme, 1, 1.0, creases=creases).mesh
+    base = subject.base.plain(mesh.vertices, mesh.polygons, creases)
     ratio, place = worst_ratio(
-        mesh, refined.vertices, subject.budget, creases, moves_curves=subject.moves_curves
+        mesh, refined.vertices, subject.budget, base, moves_curves=subject.moves_curves
     )
     return ratio, place, refined
 
@@ -60,16 +61,15 @@ def worst_ratio(
     control: Mesh,
     refined: Float[np.ndarray, "N 3"],
     curvature: float,
-    creases: Int[np.ndarray, "N 2"] = NO_CREASES,
+    base: PlainStep,
     *,
     moves_curves: bool = False,
 ) -> tuple[float, str]:
-    """Return the largest ratio ‖p − p_Loop‖ / (C h² / R) of one step, and at which vertex.
+    """Return the largest ratio ‖p − p_base‖ / (C h² / R) of one step, and at which vertex.
 
     ``curvature`` is C / R; ``moves_curves`` says whether boundaries and creases have a rule of
     their own.
     """
-    base = plain_loop(control.vertices, control.faces, creases)
     apart = np.linalg.norm(refined - base.positions, axis=1)
     reach = base.reach + base.curve_reach if moves_curves else base.reach
     ratio = apart / (curvature * reach**2 + rounding(control))

@@ -7,12 +7,10 @@ from jaxtyping import Bool, Float
 
 from pns_common import Mesh
 from train.certificates.bodies import Body, random_motion
-from train.certificates.plain_loop import plain_loop
 from train.certificates.step import step
 from train.certificates.subject import Certificate, Subject, worst
-from train.connectivity import connect
-from train.refining import AnyScheme
-from train.vectors import face_normals
+from train.refining import AnyScheme, Creases
+from train.vectors import norm, unit
 
 EXACT = 1e-12
 # Of the envelope C h² / R: a feature's last single precision bit may turn with the mesh.
@@ -27,60 +25,90 @@ WELL_SHAPED = 1e-2
 def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Certificate]:
     """Certify T2 with the network in double precision, and again as the scheme runs.
 
-    Edges whose frame degenerates are left out (the fallback frame does not turn with the mesh), and
-    so are slivers and nearly folded edges, where rounding is amplified beyond any tolerance.
+    Schemes that correct once keep mirrors too, and faces turned over. Slivers and nearly folded
+    edges are left out: rounding is amplified beyond any tolerance there, and a fallback frame does
+    not turn with the mesh.
     """
-    rows = [_certify(subject, subject.exact, bodies, seed, "double precision", 0.0)]
+    rows = [_certify(subject, subject.exact, bodies, seed, "double precision")]
     if subject.is_single_precision:
-        rows.append(_certify(subject, subject.scheme, bodies, seed, "as it runs", SINGLE))
+        rows.append(_certify(subject, subject.scheme, bodies, seed, "as it runs", single=SINGLE))
+    if subject.learned_once is not None:
+        for how, mirror in (("mirrors", -1), ("turning over", 1)):
+            rows.append(_certify(subject, subject.exact, bodies, seed, how, mirror, -1))
     return rows
 
 
 def _certify(
-    subject: Subject, scheme: AnyScheme, bodies: Sequence[Body], seed: int, how: str, single: float
+    subject: Subject,
+    scheme: AnyScheme,
+    bodies: Sequence[Body],
+    seed: int,
+    how: str,
+    mirror: int = 1,
+    order: int = 1,
+    *,
+    single: float = 0.0,
 ) -> Certificate:
     rng = np.random.default_rng(seed)
     measured, left_out = [], 0
     for body in bodies:
-        apart, kept = discrepancy(scheme, body.mesh, *random_motion(rng))
-        reach = plain_loop(body.mesh.vertices, body.mesh.faces).reach
+        turn, shift = random_motion(rng)
+        apart, kept = discrepancy(scheme, body.mesh, turn * [mirror, 1, 1], shift, order)
+        reach = subject.base.plain(body.mesh.vertices, body.mesh.polygons).reach
         # In units of what rounding allows, so that one number serves every mesh.
         share = apart / (EXACT + single * subject.budget * reach**2) * (single or EXACT)
         measured.append((float(np.max(share[kept], initial=0)), body.name))
         left_out += int((~kept).sum())
     value, place = worst(measured)
-    where = f"{place}; {left_out} ill-conditioned edges left out" if left_out else place
+    where = f"{place}; {left_out} ill-conditioned left out" if left_out else place
     return Certificate("T2", f"equivariance, {how}", value, high=single or EXACT, where=where)
 
 
 def discrepancy(
-    scheme: AnyScheme, mesh: Mesh, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
+    scheme: AnyScheme,
+    mesh: Mesh,
+    turn: Float[np.ndarray, "3 3"],
+    shift: Float[np.ndarray, "3"],
+    order: int = 1,
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
-    still = step(scheme, mesh, "auto")
-    moved = step(scheme, Mesh(mesh.vertices @ turn.T + shift, mesh.faces), "auto")
-    apart = np.linalg.norm(moved.positions - (still.positions @ turn.T + shift), axis=1)
-    kept = ~(still.degenerate | moved.degenerate)
-    kept[len(mesh.vertices) :] &= well_conditioned(mesh)
-    return apart, kept
+    """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of.
+
+    ``order`` is −1 for faces turned over.
+    """
+    faces = [face[::order] for face in mesh.polygons]
+    moved = Mesh(mesh.vertices @ turn.T + shift, faces)
+    # Inside out, what was convex is concave, and may be less sharp.
+    creases: Creases = "auto" if order * np.linalg.det(turn) > 0 else None
+    still, after = (step(scheme, each, creases).positions for each in (mesh, moved))
+    # The same edges, which turned faces number in another order.
+    here, there = (np.lexsort(each.topology().edges.T) for each in (mesh, moved))
+    places = np.arange(len(still))
+    places[len(mesh.vertices) + here] = len(mesh.vertices) + there
+    apart = np.linalg.norm(after[places] - (still @ turn.T + shift), axis=1)
+    kept = [np.ones(len(mesh.vertices), dtype=bool), well_conditioned(mesh), _shapes(mesh)[1]]
+    return apart, np.concatenate(kept)[: len(still)]
 
 
 def well_conditioned(mesh: Mesh) -> Bool[np.ndarray, " E"]:
     """Mark edges between well-shaped faces, not nearly folded; also others than interior."""
-    level = connect(mesh.faces, len(mesh.vertices))
-    interior, half_edges = level.interior.numpy(), level.half_edges[level.interior].numpy()
-    faces, normals = half_edges // 3, face_normals(mesh.vertices, mesh.faces)
+    topology, (normals, well_shaped) = mesh.topology(), _shapes(mesh)
+    faces = topology.face_of(topology.half_edges[topology.interior])
     is_open = np.linalg.norm(normals[faces].sum(axis=1), axis=1) > WELL_SHAPED
-    good = np.ones(len(level.edges), dtype=bool)
-    good[interior] = (_smallest_sine(mesh) > WELL_SHAPED)[faces].all(axis=1) & is_open
+    good = np.ones(len(topology.edges), dtype=bool)
+    good[topology.interior] = well_shaped[faces].all(axis=1) & is_open
     return good
 
 
-def _smallest_sine(mesh: Mesh) -> Float[np.ndarray, " F"]:
-    """Return a face's smallest sine: twice its area over the product of its two longest sides."""
-    corners = mesh.vertices[mesh.faces]
-    sides = corners[:, [1, 2, 0]] - corners
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    lengths = np.sort(np.linalg.norm(sides, axis=-1), axis=1)
-    product = lengths[:, 1] * lengths[:, 2]
-    return np.where(product > 0, area / np.where(product > 0, product, 1.0), 0.0)
+def _shapes(mesh: Mesh) -> tuple[Float[np.ndarray, "F 3"], Bool[np.ndarray, " F"]]:
+    """Return unit normals of faces, and whether their smallest sine is large enough.
+
+    That is twice a triangle's area over the product of its two longest sides.
+    """
+    starts, degrees = mesh.offsets[:-1], np.diff(mesh.offsets)
+    # From each face's first corner: beyond its last one comes the next face's, which is 0 too.
+    arms = mesh.vertices[mesh.corners] - np.repeat(mesh.vertices[mesh.corners[starts]], degrees, 0)
+    following = np.roll(arms, -1, axis=0)
+    areas = np.add.reduceat(np.cross(arms, following), starts)
+    sides = norm(following - arms)
+    falling = sides[np.lexsort((-sides, np.repeat(starts, degrees)))]
+    return unit(areas), norm(areas) > WELL_SHAPED * falling[starts] * falling[starts + 1]

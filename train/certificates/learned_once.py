@@ -1,27 +1,28 @@
-"""Certificates of schemes that correct at the control mesh and are Loop afterwards.
+"""Certificates of schemes that correct at the control mesh and are the base scheme afterwards.
 
 Fold-free, limit distance, smoothness class and resolution independence: docs/theorems.md proves
 them for the scale-free rule and any weights.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Literal
 
 import numpy as np
+import scipy.sparse as sparse
 from jaxtyping import Bool, Float, Int
 
-from pns_common import Creases, Mesh, Scheme, loop
+from pns_common import Creases, Mesh, Scheme
 from pns_common import refine as refine_by_library
 from train.certificates.bodies import Body
-from train.certificates.plain_loop import plain_loop
+from train.certificates.plain import PlainStep
+from train.certificates.scaling import SAME_AS_BASE
 from train.certificates.step import rounding, step, trials
 from train.certificates.subject import Certificate, Subject, worst
-from train.connectivity import connect
-from train.refining import AnyScheme, refine
+from train.refining import refine
 
-# Child faces that Loop makes flatter than this, in squared edge lengths, have no direction.
+# Child faces that the base makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
 # In degrees: what positions rounded to doubles may turn a face by.
 ROUNDING_ANGLE = 1e-5
@@ -31,41 +32,58 @@ SCALES = (2.0**-12, 2.0**-3, 2.0**5)
 
 
 def fold_free(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
-    """Certify that no child face turns by more than θ from Loop's with the same creases.
+    """Certify that no child face turns by more than θ from the base's with the same creases.
 
-    The value is the largest turn in degrees.
+    The value is the largest turn in degrees, of a quad at any of its corners.
     """
-    card = subject.learned_once
-    angle = math.nan if card is None or card.fold_angle is None else card.fold_angle
-    measured = []
-    for trial in trials(subject, bodies, seed):
-        base = plain_loop(trial.mesh.vertices, trial.mesh.faces, trial.creases).positions
-        made = step(subject.scheme, trial.mesh, creases=trial.creases)
-        faces = made.level.split().numpy()
-        measured.append((largest_turn(faces, base, made.positions), trial.name))
+    measured = [
+        (largest_turn(base.triangles, base.positions, made), name)
+        for name, base, made in _children(subject, bodies, seed)
+    ]
     turn, place = worst(measured)
-    return Certificate("folds", "fold-free", turn, high=angle + ROUNDING_ANGLE, where=place)
+    return Certificate("folds", "fold-free", turn, high=_fold_angle(subject), where=place)
 
 
 def neighbour_turns(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
-    """Certify that no two neighbouring child faces turn by more than 2 θ beyond Loop's pair.
+    """Certify that no two neighbouring child faces turn by more than 2 θ beyond the base's pair.
 
     The value is the largest excess in degrees. It follows from `fold_free` by the triangle
     inequality on the sphere of normals.
     """
+    measured = [
+        (largest_excess(base.triangles, neighbours(base.triangles), base.positions, made), name)
+        for name, base, made in _children(subject, bodies, seed)
+    ]
+    excess, place = worst(measured)
+    high = 2 * _fold_angle(subject)
+    return Certificate("turns", "turns of neighbours", excess, high=high, where=place)
+
+
+def _fold_angle(subject: Subject) -> float:
+    """Return θ with what rounding adds, in degrees; NaN without a guard."""
     card = subject.learned_once
     angle = math.nan if card is None or card.fold_angle is None else card.fold_angle
-    measured = []
+    return angle + ROUNDING_ANGLE
+
+
+def _children(
+    subject: Subject, bodies: Sequence[Body], seed: int
+) -> Iterator[tuple[str, PlainStep, Float[np.ndarray, "W 3"]]]:
+    """Yield each trial's name, its step by the base scheme, and its new vertices by the subject."""
     for trial in trials(subject, bodies, seed):
-        base = plain_loop(trial.mesh.vertices, trial.mesh.faces, trial.creases).positions
-        made = step(subject.scheme, trial.mesh, creases=trial.creases)
-        faces = made.level.split().numpy()
-        children = connect(faces, len(base))
-        pairs = (children.half_edges[children.paired] // 3).numpy()
-        measured.append((largest_excess(faces, pairs, base, made.positions), trial.name))
-    excess, place = worst(measured)
-    high = 2 * (angle + ROUNDING_ANGLE)
-    return Certificate("turns", "turns of neighbours", excess, high=high, where=place)
+        base = subject.base.plain(trial.mesh.vertices, trial.mesh.polygons, trial.creases)
+        yield trial.name, base, step(subject.scheme, trial.mesh, trial.creases).positions
+
+
+def neighbours(triangles: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, "N 2"]:
+    """Return the pairs of triangles that run through a side in opposite directions."""
+    starts, ends = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    lower, upper = np.minimum(starts, ends), np.maximum(starts, ends)
+    _, side = np.unique(lower * (upper.max() + 1) + upper, return_inverse=True)
+    owner, along = np.arange(len(starts)) // 3, np.where(starts < ends, 1, -1)
+    incidence = sparse.csr_array((along, (owner, side.reshape(-1))))
+    shared = sparse.triu(incidence @ incidence.T).tocoo()
+    return np.stack([shared.row, shared.col], axis=1)[shared.data < 0]
 
 
 def largest_excess(
@@ -112,7 +130,7 @@ def _angle(u: Float[np.ndarray, "N 3"], v: Float[np.ndarray, "N 3"]) -> Float[np
 
 
 def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
-    """Certify that the report of two levels bounds the distance from Loop's limit surface.
+    """Certify that the report of two levels bounds the distance from the base's limit surface.
 
     The value is the largest distance between the two limits at common parameters, as a fraction of
     what the report says; and what it says must be no more than the budget's bound, which it comes
@@ -126,7 +144,7 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
         assert isinstance(subject.scheme, Scheme)
         refined = partial(refine_by_library, trial.mesh, threads=1)
         ours = refined(subject.scheme, 2, 1.0, limit=True, creases=creases)
-        theirs = refined(loop(), 2, 1.0, limit=True, creases=Creases())
+        theirs = refined(subject.base.scheme, 2, 1.0, limit=True, creases=Creases())
         apart = np.linalg.norm(ours.mesh.vertices - theirs.mesh.vertices, axis=1).max()
         stated, bound = (ours.report[key] for key in ("limit_distance", "limit_distance_bound"))
         assert stated is not None
@@ -139,10 +157,10 @@ def limit_distance(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> C
 
 
 def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify that the rule becomes Loop's: its limits are C² off extraordinary points.
+    """Certify that the rule becomes the base's: its limits are C² off extraordinary points.
 
     It does after the control mesh, or later where it keeps creases for longer. The value is the
-    largest difference from an independent Loop at the level after, in the mesh's extents; NaN for a
+    largest difference from an independent base at the level after, in the mesh's extents; NaN for a
     scheme that never stops to correct.
     """
     name, card = "smoothness class", subject.learned_once
@@ -154,7 +172,7 @@ def smoothness_class(subject: Subject, bodies: Sequence[Body]) -> Certificate:
         last, after = (
             refine(body.mesh, subject.scheme, count, 1.0).mesh for count in (first, first + 1)
         )
-        expected = plain_loop(last.vertices, last.faces).positions
+        expected = subject.base.plain(last.vertices, last.polygons).positions
         extent = np.ptp(last.vertices, axis=0).max()
         measured.append((float(np.abs(after.vertices - expected).max() / extent), body.name))
     value, place = worst(measured)
@@ -167,20 +185,20 @@ def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certifi
     R stays what it is. A rule in units of h² / R fails: it is right at one resolution alone. The
     value is the largest relative difference.
     """
-    assert subject.unbounded is not None
     measured = []
     for body in bodies:
-        own = _displacement(subject.unbounded, body.mesh)
+        own = _displacement(subject, body.mesh)
         size = np.abs(own).max()
         if size == 0:
             continue
         for scale in SCALES:
-            scaled = Mesh(scale * body.mesh.vertices, body.mesh.faces)
-            apart = _displacement(subject.unbounded, scaled) / scale - own
+            scaled = Mesh(scale * body.mesh.vertices, body.mesh.polygons)
+            apart = _displacement(subject, scaled) / scale - own
             measured.append((float(np.abs(apart).max() / size), f"{body.name}, times {scale:g}"))
-    value, place = worst(measured) if measured else (0.0, "the scheme is Loop on every mesh")
+    value, place = worst(measured) if measured else (0.0, SAME_AS_BASE)
     return Certificate("scale", "resolution independence", value, high=SAME, where=place)
 
 
-def _displacement(scheme: AnyScheme, mesh: Mesh) -> Float[np.ndarray, "N 3"]:
-    return step(scheme, mesh).positions - step(loop(), mesh).positions
+def _displacement(subject: Subject, mesh: Mesh) -> Float[np.ndarray, "N 3"]:
+    assert subject.unbounded is not None
+    return step(subject.unbounded, mesh).positions - step(subject.base.scheme, mesh).positions

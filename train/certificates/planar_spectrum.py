@@ -1,14 +1,14 @@
 """T8, planar spectral inheritance, and lifted stars, of which no theorem speaks.
 
-At a flat k-star the scheme's linearisation is Loop's. Off the plane the signed Reif margin is a
-diagnostic.
+At a flat k-star the scheme's linearisation is that of its base. Off the plane the signed Reif
+margin is a diagnostic.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from pns_common import loop
+from train.certificates.bases import LOOP, Base
 from train.certificates.subject import Certificate, Kind, Subject, worst
 from train.refining import AnyScheme, refine
 from train.spectra.spectrum import (
@@ -17,8 +17,6 @@ from train.spectra.spectrum import (
     closed_star,
     follow_lift,
     jacobian,
-    loop_eigenvalue,
-    loop_gap,
     perturbed_stars,
     refined_inner,
     reif_gap,
@@ -45,17 +43,18 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     flat, finest = FLAT, EIGENVALUE
     if subject.learned_once is not None:
         flat, finest = SHARPER_FLAT, SHARPER_EIGENVALUE
+    base = subject.base
     for valence in valences:
         place = f"k = {valence}"
-        size = spectrum(subject.exact, valence)
-        tangent = np.abs(size[:TANGENT_COUNT] - loop_eigenvalue(valence)).max()
-        deviations.append((derivative_of_departure(subject.exact, valence), place))
+        size = spectrum(subject.exact, valence, base)
+        tangent = np.abs(size[:TANGENT_COUNT] - base.eigenvalue(valence)).max()
+        deviations.append((derivative_of_departure(subject.exact, valence, base), place))
         tangents.append((float(tangent), place))
-        gaps.append((abs(reif_gap(size) - loop_gap(valence)), place))
+        gaps.append((abs(reif_gap(size) - base.gap(valence)), place))
     rows = (
-        ("derivative of the departure from Loop", deviations, flat),
-        ("tangent eigenvalues against 3/8 + ¼ cos 2π/k", tangents, finest),
-        ("Reif gap against Loop's", gaps, finest),
+        (f"derivative of the departure from {base.name}", deviations, flat),
+        (f"tangent eigenvalues against {base.formula}", tangents, finest),
+        (f"Reif gap against {base.name}'s", gaps, finest),
     )
     return [
         Certificate("T8", f"planar spectrum: {name}", *_value_high(measured, bound))
@@ -63,25 +62,26 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     ]
 
 
-def spectrum(scheme: AnyScheme, valence: int) -> np.ndarray:
+def spectrum(scheme: AnyScheme, valence: int, base: Base = LOOP) -> np.ndarray:
     """Return |λ| of the linearisation at a flat star, largest first, translations left out."""
-    matrix = without_translations(jacobian(scheme, closed_star(scheme, valence, FINE)(0.0), FINE))
+    star = closed_star(scheme, valence, FINE, base.star)(0.0)
+    matrix = without_translations(jacobian(scheme, star, FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 
-def derivative_of_departure(scheme: AnyScheme, valence: int) -> float:
-    """Return the largest ‖S − S_Loop‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
+def derivative_of_departure(scheme: AnyScheme, valence: int, base: Base = LOOP) -> float:
+    """Return the largest ‖S − S_base‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
 
     One-sided: a gate with a kink at flat faces cancels in central differences, and automatic
     differentiation calls its slope 0 too.
     """
-    star, step = closed_star(scheme, valence, TINY)(0.0), TINY * SPOKE
+    star, step = closed_star(scheme, valence, TINY, base.star)(0.0), TINY * SPOKE
     mesh, count = perturbed_stars(star, step)
-    refined, base = (
+    refined, plain = (
         refined_inner(star, refine(mesh, rule, 1, 1.0).mesh.vertices, 2 * count)
-        for rule in (scheme, loop())
+        for rule in (scheme, base.scheme)
     )
-    return float(np.abs(refined - base).max()) / step
+    return float(np.abs(refined - plain).max()) / step
 
 
 def _value_high(measured: list[tuple[float, str]], high: float) -> tuple[float, float, float, str]:

@@ -1,9 +1,9 @@
 """T4 to T7: the orders in h, normals that settle, and a bounded answer to small moves.
 
 T4 and T6 scale one mesh down with the reference length held at 1: features do not see the scale,
-so the correction falls as h² exactly, and normals approach Loop's as h. T5 is measured, not proved:
-C¹ limits show in the refined meshes, where the angle between neighbouring faces goes to nothing.
-T7 moves vertices by ε, which moves the refined mesh by a multiple of ε.
+so the correction falls as h² exactly, and normals approach the base scheme's as h. T5 is measured,
+not proved: C¹ limits show in the refined meshes, where the angle between neighbouring faces goes to
+nothing. T7 moves vertices by ε, which moves the refined mesh by a multiple of ε.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pns_common import Mesh, loop
-from train.certificates.bodies import Body, bumpy_torus
+from pns_common import Mesh
+from train.certificates.bodies import Body
 from train.certificates.step import step
 from train.certificates.subject import Certificate, Kind, Subject, farthest
-from train.refining import AnyScheme, refine
+from train.refining import refine
 from train.vectors import face_normals
 
 # Powers of two: scaling is exact. Normals need small ones to be in the linear regime.
@@ -24,30 +24,35 @@ SCALES = 2.0 ** -np.arange(4, 11)
 # A scale-free rule asks for a share of h: the budget, which falls as h², takes over far below.
 SMALLER_SCALES = 2.0 ** -np.arange(18, 25)
 
-Measure = Callable[[AnyScheme, Mesh], float]
+SAME_AS_BASE = "the scheme is its base on every mesh"
+
+Measure = Callable[[Subject, Mesh], float]
 
 
 def proximity_slope(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify T4: the largest distance from Loop falls with slope 2."""
-    return _slope("T4", "proximity slope", 2.0, 1e-3, subject, bodies, distance_from_loop)
+    """Certify T4: the largest distance from the base scheme falls with slope 2."""
+    return _slope("T4", "proximity slope", 2.0, 1e-3, subject, bodies, distance_from_base)
 
 
 def normal_variation_slope(subject: Subject, bodies: Sequence[Body]) -> Certificate:
-    """Certify T6: the largest difference of a face's normal from Loop's falls with slope 1."""
-    return _slope("T6", "normal-variation slope", 1.0, 1e-2, subject, bodies, normals_from_loop)
+    """Certify T6: the largest difference of a face's normal from the base's falls with slope 1."""
+    return _slope("T6", "normal-variation slope", 1.0, 1e-2, subject, bodies, normals_from_base)
 
 
-def distance_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
-    """Return ‖S(M) − S_Loop(M)‖ over all new vertices."""
-    apart = step(scheme, mesh).positions - step(loop(), mesh).positions
+def distance_from_base(subject: Subject, mesh: Mesh) -> float:
+    """Return ‖S(M) − S_base(M)‖ over all new vertices."""
+    apart = step(subject.exact, mesh).positions - step(subject.base.scheme, mesh).positions
     return float(np.linalg.norm(apart, axis=1).max())
 
 
-def normals_from_loop(scheme: AnyScheme, mesh: Mesh) -> float:
-    """Return ‖n − n_Loop‖ over all faces of the refined mesh."""
-    ours, base = step(scheme, mesh), step(loop(), mesh)
-    faces = ours.level.split().numpy()
-    apart = face_normals(ours.positions, faces) - face_normals(base.positions, faces)
+def normals_from_base(subject: Subject, mesh: Mesh) -> float:
+    """Return ‖n − n_base‖ over all triangles of the refined mesh."""
+    triangles = subject.base.plain(mesh.vertices, mesh.polygons).triangles
+    ours, base = (
+        face_normals(step(rules, mesh).positions, triangles)
+        for rules in (subject.exact, subject.base.scheme)
+    )
+    apart = ours - base
     return float(np.linalg.norm(apart, axis=1).max())
 
 
@@ -70,14 +75,14 @@ def _slope(
     slopes = []
     for body in bodies:
         values = np.array(
-            [measure(subject.exact, Mesh(s * body.mesh.vertices, body.mesh.faces)) for s in scales]
+            [measure(subject, Mesh(s * body.mesh.vertices, body.mesh.polygons)) for s in scales]
         )
-        # A scheme that is Loop here has no slope, and holds the theorem at any.
+        # A scheme that is its base here has no slope, and holds the theorem at any.
         if values.any():
             slope = fitted_slope(scales, values) if values.all() else float("nan")
             slopes.append((slope, body.name))
     if not slopes:
-        return Certificate(theorem, name, expected, low, high, "the scheme is Loop on every mesh")
+        return Certificate(theorem, name, expected, low, high, SAME_AS_BASE)
     slope, place = farthest(slopes, expected)
     return Certificate(theorem, name, slope, low, high, place)
 
@@ -87,13 +92,13 @@ LEVELS = 5
 AT_LEAST = 0.5
 
 
-def regular_smoothness(subject: Subject, seed: int) -> Certificate:
-    """Measure T5 on a torus whose vertices are all regular: the order at which normals settle.
+def regular_smoothness(subject: Subject, torus: Mesh) -> Certificate:
+    """Measure T5 on a mesh whose vertices are all regular: the order at which normals settle.
 
     The value is the fall of the largest face-normal jump from the last level but one to the last,
-    in powers of two; 1 for Loop.
+    in powers of two; 1 for a base scheme.
     """
-    refined = refine(bumpy_torus(seed), subject.scheme, LEVELS, 1.0)
+    refined = refine(torus, subject.scheme, LEVELS, 1.0)
     jumps = np.array([level.normal_jump for level in refined.levels])
     order = float(np.log2(jumps[-2] / jumps[-1])) if jumps[-1] > 0 else np.inf
     where = f"bumpy torus, level {LEVELS}: largest jump {np.degrees(jumps[-1]):.1f}°"
@@ -122,7 +127,7 @@ def lipschitz_slope(subject: Subject, bodies: Sequence[Body], seed: int) -> Cert
         still = step(subject.exact, body.mesh).positions
         changes = []
         for epsilon in epsilons:
-            moved = Mesh(body.mesh.vertices + epsilon * move, body.mesh.faces)
+            moved = Mesh(body.mesh.vertices + epsilon * move, body.mesh.polygons)
             apart = step(subject.exact, moved).positions - still
             changes.append(np.linalg.norm(apart, axis=1).max())
         measured.append((fitted_slope(epsilons, np.array(changes)), body.name))

@@ -6,14 +6,11 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from pns_common import Mesh, loop
+from pns_common import Mesh
 from train.certificates.bodies import Body
 from train.certificates.subject import Subject
-from train.connectivity import Connectivity, connect
-from train.reference import Surroundings, edge_frames, read_edges
 from train.refining import AnyScheme, refine
 
 
@@ -24,29 +21,15 @@ class Step:
     Attributes:
         positions: where the scheme puts them.
         ratio: the proximity ratio that the scheme reports: finer than positions where these round.
-        level: connectivity of the control mesh.
     """
 
     mesh: Mesh
     positions: Float[np.ndarray, "N 3"]
     ratio: Float[np.ndarray, " N"]
-    level: Connectivity
 
-    @property
-    def degenerate(self) -> Bool[np.ndarray, " N"]:
-        """Vertices of interior edges whose frame is the fallback."""
-        points = torch.tensor(self.mesh.vertices)
-        edges = read_edges(Surroundings(self.level, points), first_face=True)
-        frames = edge_frames(edges, first_face=True)
-        marks = np.zeros(len(self.positions), dtype=bool)
-        interior = self.level.interior
-        marks[len(points) + interior] = frames.degenerate[interior]
-        return marks
-
-    def added(self, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-        """Return ‖δ‖ from positions and Loop's; where these round, from ratio and envelope."""
-        base = step(loop(), self.mesh).positions
-        apart = np.linalg.norm(self.positions - base, axis=1)
+    def added(self, base: AnyScheme, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """Return ‖δ‖ from positions and a base's; where these round, from ratio and envelope."""
+        apart = np.linalg.norm(self.positions - step(base, self.mesh).positions, axis=1)
         return np.where(apart <= rounding(self.mesh), self.ratio * envelope, apart)
 
 
@@ -57,13 +40,10 @@ def step(
 ) -> Step:
     """Apply a scheme once, at reference length 1.
 
-    ``creases`` are edges to be kept sharp; "auto": the scheme's own, which `Step.level` does not
-    know.
+    ``creases`` are edges to be kept sharp; "auto": the scheme's own.
     """
     refined = refine(mesh, scheme, 1, 1.0, creases=creases)
-    named = None if isinstance(creases, str) else creases
-    level = connect(mesh.faces, len(mesh.vertices), named)
-    return Step(mesh, refined.mesh.vertices, refined.ratio, level)
+    return Step(mesh, refined.mesh.vertices, refined.ratio)
 
 
 def rounding(mesh: Mesh) -> float:
@@ -92,7 +72,7 @@ def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Tria
     rng = np.random.default_rng(seed)
     sizes = (1.0,) if subject.learned_once is None else (1.0, SMALL)
     for body, size in product(bodies, sizes):
-        mesh = Mesh(size * body.mesh.vertices, body.mesh.faces)
+        mesh = Mesh(size * body.mesh.vertices, body.mesh.polygons)
         name = body.name if size == 1 else f"{body.name} times {size:g}"
         yield Trial(name, mesh, NO_CREASES)
         yield Trial(f"creased {name}", mesh, drawn_creases(mesh, rng))
@@ -100,5 +80,5 @@ def trials(subject: Subject, bodies: Sequence[Body], seed: int) -> Iterator[Tria
 
 def drawn_creases(mesh: Mesh, rng: np.random.Generator) -> Int[np.ndarray, "N 2"]:
     """Return a quarter of a mesh's edges, which make darts, curves and corners."""
-    edges = np.unique(connect(mesh.faces, len(mesh.vertices)).edges.numpy(), axis=0)
+    edges = np.unique(mesh.topology().edges.astype(np.int64), axis=0)
     return edges[rng.random(len(edges)) < 1 / 4]

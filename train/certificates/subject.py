@@ -8,6 +8,7 @@ from enum import StrEnum
 from pns_common import pns
 from pns_common.model.card import DEFAULT_FORMAT, ModelCard
 from pns_common.model.session import Model
+from train.certificates.bases import CATMULL_CLARK, LOOP, Base
 from train.models.networks import BoundedNet
 from train.models.torch_model import TorchModel
 from train.refining import AnyScheme
@@ -44,8 +45,14 @@ class Subject:
         return self.exact is not self.scheme
 
     @property
+    def base(self) -> Base:
+        """The base scheme; Loop without a model."""
+        polygons = self.card is not None and self.card.base == CATMULL_CLARK.scheme.name
+        return CATMULL_CLARK if polygons else LOOP
+
+    @property
     def learned_once(self) -> ModelCard | None:
-        """The card of a scheme that corrects at the control mesh alone, and is Loop afterwards."""
+        """The card of a scheme that corrects the control mesh alone: then it is its base."""
         card = self.card
         return card if card is not None and card.format == DEFAULT_FORMAT else None
 

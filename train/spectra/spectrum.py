@@ -14,7 +14,7 @@ from torch import Tensor
 from pns_common import Mesh, ParameterError
 from train.refining import AnyScheme, refine
 from train.spectra import stars
-from train.spectra.stars import Star, Subspace, keeps_blocks, symmetry_blocks
+from train.spectra.stars import BuildStar, Star, Subspace, keeps_blocks, symmetry_blocks
 
 # Spoke of every star, in reference lengths.
 SPOKE = 0.25
@@ -53,12 +53,33 @@ def loop_gap(valence: int) -> float:
     return loop_eigenvalue(valence) - loop_third(valence)
 
 
+def catmull_clark_eigenvalue(valence: int, frequency: int = 1) -> float:
+    """Return the larger eigenvalue of a frequency from 1 on; of 1 it is the tangent eigenvalue.
+
+    (5 + c + cos(πj/k) √(18 + 2 c)) / 16 with c = cos 2πj/k: Halstead, Kass and DeRose, 1993.
+    """
+    half = math.pi * frequency / valence
+    c = math.cos(2 * half)
+    return (5 + c + math.cos(half) * math.sqrt(18 + 2 * c)) / 16
+
+
+def catmull_clark_gap(valence: int) -> float:
+    """Return Catmull–Clark's Reif gap: the third is of frequency 0, or of frequency 2."""
+    k = valence
+    third = (3 - 7 / k + math.sqrt((3 - 7 / k) ** 2 + 12 / k - 4)) / 8
+    if k >= 4:
+        third = max(third, catmull_clark_eigenvalue(k, 2))
+    return catmull_clark_eigenvalue(k) - third
+
+
 def reif_gap(size: Float[np.ndarray, " M"]) -> float:
     """Return λ_t − |λ_3| of eigenvalues' magnitudes without translations, largest first."""
     return float(size[TANGENT_COUNT - 1] - size[TANGENT_COUNT])
 
 
-def closed_star(scheme: AnyScheme, valence: int, shake: float = 1 / 20) -> Callable[[float], Star]:
+def closed_star(
+    scheme: AnyScheme, valence: int, shake: float = 1 / 20, build_star: BuildStar = stars.star
+) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
     Two rings suffice where an edge sees its two faces and a vertex its neighbours; a scheme that
@@ -69,9 +90,9 @@ def closed_star(scheme: AnyScheme, valence: int, shake: float = 1 / 20) -> Calla
         ParameterError: the scheme sees further than all rings tried.
     """
     for rings, inner_rings in RINGS:
-        build = partial(stars.star, valence, rings, SPOKE, inner_rings=inner_rings)
+        build = partial(build_star, valence, rings, SPOKE, inner_rings=inner_rings)
         alone = build(0.0)
-        wider = stars.star(valence, rings + 2, SPOKE, inner_rings=inner_rings)
+        wider = build_star(valence, rings + 2, SPOKE, inner_rings=inner_rings)
         noise = np.random.default_rng(0).standard_normal(wider.mesh.vertices.shape) * SPOKE * shake
         refined = []
         for star in (alone, wider):
@@ -99,7 +120,8 @@ def perturbed_stars(star: Star, step: float) -> tuple[Mesh, int]:
     copies[column, star.inner[column // 3], column % 3] += step
     copies[count + column, star.inner[column // 3], column % 3] -= step
     offsets = np.arange(2 * count)[:, None, None] * len(points)
-    return Mesh(copies.reshape(-1, 3), (faces[None] + offsets).reshape(-1, 3)), count
+    copied = (faces[None] + offsets).reshape(-1, faces.shape[1])
+    return Mesh(copies.reshape(-1, 3), copied), count
 
 
 Coordinates = TypeVar("Coordinates", np.ndarray, Tensor)
@@ -109,13 +131,13 @@ def refined_inner(
     star: Star, refined: Float[Coordinates, "V 3"], copies: int
 ) -> Float[Coordinates, "S M"]:
     """Return the refined inner coordinates of each of `copies` stars that were refined together."""
-    old = len(star.mesh.vertices)
-    total = copies * old
-    edges = (len(refined) - total) // copies
-    copy = np.arange(copies)[:, None]
-    rows = np.where(
-        star.refined < old, copy * old + star.refined, total + copy * edges + star.refined - old
-    )
+    # Rows are the old vertices of all copies, then those of their edges, then those of faces.
+    whole, old = len(refined) // copies, len(star.mesh.vertices)
+    faces = 0 if star.mesh.triangles else star.mesh.face_count
+    starts = np.array([0, old, whole - faces, whole])
+    kind = np.searchsorted(starts, star.refined, side="right") - 1
+    first, size = starts[kind], np.diff(starts)[kind]
+    rows = copies * first + np.arange(copies)[:, None] * size + star.refined - first
     return refined[rows].reshape(copies, -1)
 
 

@@ -5,6 +5,7 @@ simple, and a tangent can only be confused with another eigenvalue of its own bl
 of one block are followed apart from those of the others.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
 
@@ -12,7 +13,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh
-from train.connectivity import connect
 
 # Place (sector, i, j) is i steps along the sector's first spoke and j along its second.
 Place = tuple[int, int, int]
@@ -34,6 +34,9 @@ class Star:
     refined: Int[np.ndarray, " N"]
 
 
+BuildStar = Callable[..., Star]
+
+
 def star(
     valence: int, rings: int, spoke: float, lift: float = 0.0, *, inner_rings: int = 2
 ) -> Star:
@@ -47,31 +50,70 @@ def star(
         inner_rings: rings that the spectrum looks at; with two of them Loop's spectrum is whole
             (one ring misses its eigenvalue 1/8).
     """
-    places = _places(valence, rings)
-    number = {place: index for index, place in enumerate(places)}
+    faces: list[list[Place]] = []
+    for s, i in product(range(valence), range(rings)):
+        for j in range(rings - i):
+            faces.append([(s, i, j), (s, i + 1, j), (s, i, j + 1)])
+            if i + j + 2 <= rings:
+                faces.append([(s, i + 1, j), (s, i + 1, j + 1), (s, i, j + 1)])
+    ringed = [[(ring - j, j) for j in range(ring)] for ring in range(rings + 1)]
+    return _build(valence, ringed, faces, spoke, lift, inner_rings)
+
+
+def quad_star(
+    valence: int, rings: int, spoke: float, lift: float = 0.0, *, inner_rings: int = 2
+) -> Star:
+    """Build a star of sectors of rings² quads; arguments as for `star`."""
+    cells = product(range(valence), range(rings), range(rings))
+    faces = [[(s, i, j), (s, i + 1, j), (s, i + 1, j + 1), (s, i, j + 1)] for s, i, j in cells]
+    ringed = [
+        [*((ring, j) for j in range(ring + 1)), *((i, ring) for i in range(ring - 1, 0, -1))]
+        for ring in range(rings + 1)
+    ]
+    return _build(valence, ringed, faces, spoke, lift, inner_rings)
+
+
+def _build(
+    valence: int,
+    ringed: list[list[tuple[int, int]]],
+    faces: list[list[Place]],
+    spoke: float,
+    lift: float,
+    inner_rings: int,
+) -> Star:
+    """Build a star from its faces and the places of a sector, ring by ring.
+
+    A spoke belongs to the sector that it begins.
+    """
+    places: list[Place] = [(0, 0, 0)]
+    for row, sector in product(ringed[1:], range(valence)):
+        places += [(sector, i, j) for i, j in row]
+    number = {place: v for v, place in enumerate(places)}
     points = np.array([_position(place, valence) for place in places]) * spoke
     points[0, 2] = lift * spoke
-    mesh = Mesh(points, _faces(valence, rings, number))
 
-    inner = [place for place in places if place[1] + place[2] <= inner_rings]
-    edges = connect(mesh.faces, len(points)).edges.tolist()
-    edge = {tuple(ends): index for index, ends in enumerate(edges)}
-    refined = []
-    for sector, i, j in inner:
-        # At half the size, place (i, j) is half-way between two places of the old star.
-        low = _canonical(sector, i // 2, j - j // 2, valence)
-        high = _canonical(sector, i - i // 2, j // 2, valence)
-        first, second = sorted((number[low], number[high]))
-        refined.append(first if first == second else len(points) + edge[first, second])
-    return Star(mesh, np.array([number[place] for place in inner]), np.array(refined))
+    def vertices(face: Iterable[Place]) -> list[int]:
+        return [number[_canonical(*place, valence)] for place in face]
+
+    mesh = Mesh(points, [vertices(face) for face in faces])
+    rows = mesh.faces
+    sides = np.stack([rows, np.roll(rows, -1, axis=1)], axis=-1).reshape(-1, 2)
+    made = [*({v} for v in range(len(places))), *sides.tolist(), *rows.tolist()]
+    new = {ends: w for w, ends in enumerate(dict.fromkeys(map(frozenset, made)))}
+    # At half the size, place (i, j) is half-way between one, two or four places of the old star.
+    inner = places[: 1 + valence * sum(map(len, ringed[1 : inner_rings + 1]))]
+    ends = [_ends(place, of_quads=not mesh.triangles) for place in inner]
+    refined = [new[frozenset(vertices(between))] for between in ends]
+    return Star(mesh, np.arange(len(inner)), np.array(refined))
 
 
-def _places(valence: int, rings: int) -> list[Place]:
-    """Return all places, ring by ring; a spoke belongs to the sector that it begins."""
-    places: list[Place] = [(0, 0, 0)]
-    for ring, sector in product(range(1, rings + 1), range(valence)):
-        places += [(sector, ring - j, j) for j in range(ring)]
-    return places
+def _ends(place: Place, *, of_quads: bool) -> list[Place]:
+    """Return the places that a place at half the size lies between."""
+    sector, i, j = place
+    low_i, high_i, low_j, high_j = i // 2, i - i // 2, j // 2, j - j // 2
+    if of_quads:
+        return [(sector, *ends) for ends in product((low_i, high_i), (low_j, high_j))]
+    return [(sector, low_i, high_j), (sector, high_i, low_j)]
 
 
 def _canonical(sector: int, i: int, j: int, valence: int) -> Place:
@@ -86,20 +128,6 @@ def _position(place: Place, valence: int) -> Float[np.ndarray, "3"]:
     x = i * np.cos(first) + j * np.cos(second)
     y = i * np.sin(first) + j * np.sin(second)
     return np.array([x, y, 0.0])
-
-
-def _faces(valence: int, rings: int, number: dict[Place, int]) -> Int[np.ndarray, "F 3"]:
-    faces = []
-    for sector, i in product(range(valence), range(rings)):
-        for j in range(rings - i):
-
-            def vertex(i: int, j: int, sector: int = sector) -> int:
-                return number[_canonical(sector, i, j, valence)]
-
-            faces.append((vertex(i, j), vertex(i + 1, j), vertex(i, j + 1)))
-            if i + j + 2 <= rings:
-                faces.append((vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)))
-    return np.array(faces, dtype=np.int64)
 
 
 # An orthonormal basis of an invariant subspace.
