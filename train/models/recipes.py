@@ -151,7 +151,7 @@ def general_quad(seed: int = 0) -> Recipe:
             reuse=16,
             start=0,
         ),
-        steps=0,
+        steps=1500,
         sharpness=replace(base.sharpness, of_model="general"),
         face=NetworkShape("face-8", hidden=(32, 32)),
     )
