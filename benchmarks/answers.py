@@ -27,8 +27,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.generated import torus
+from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import of_triangles
-from service.meshfiles.triangles_glb import triangles_glb
 
 ROOT = Path(__file__).resolve().parents[1]
 PEERS = Path(__file__).with_name("peers")

@@ -15,8 +15,8 @@ from service.bodies.sibling_files import ALONE, SiblingFiles
 from service.course import Course
 from service.errors import ServiceError
 from service.gltf.subdivide import Subdivided, subdivide_gltf
+from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import of_triangles
-from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 
 RUNS = 5

@@ -37,8 +37,8 @@ def three_levels() -> Callable[[], object]:
 def file() -> Callable[[], object]:
     """Refine a GLB of 60,000 faces twice, from bytes to bytes."""
     from service.gltf.subdivide import subdivide_gltf
+    from service.meshfiles.glb import triangles_glb
     from service.meshfiles.mesh_file import of_triangles
-    from service.meshfiles.triangles_glb import triangles_glb
     from service.options import Limits, Options
 
     mesh, model = torus(60_000), load_model()

@@ -117,6 +117,37 @@ class Options:
 # What a parameter is where it is not given.
 DEFAULTS = Options()
 
+# What each says to users, of the command line and of HTTP.
+DESCRIPTIONS = {
+    "levels": f"depth, 1 to {MAX_LEVELS}: each level makes four faces of one",
+    "scheme": "the rules. auto: pns for triangles, catmull-clark for OBJ, PLY and OFF files with "
+    "polygons. pns and loop cut polygons; loop is without the learned correction",
+    "budget": "C, dimensionless: how far the model may go from Loop. Default: the model's own",
+    "reference_length": "R, the unit of length of the budget; auto measures each mesh",
+    "diagnostics": "what a glTF carries of the report. full: also the vertex attributes "
+    "_PNS_RATIO and _PNS_GATE of the last learned level",
+    "uv": "smooth: Loop's stencil inside charts; their boundaries stay linear",
+    "normals": "auto: those of the file; where a mesh has none, new ones, smooth but across sharp "
+    "edges. keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
+    "limit surface, with the option limit",
+    "crease": "edges to keep sharp. auto: each as sharp as the model's sharpness network finds "
+    "it, at as many levels as its card says; none without one. normals: edges whose two sides "
+    "carry different normals. angle: and degrees: edges whose faces meet at more. off: none",
+    "weld": "which vertices are one. position: those in one place. index: those that the file "
+    "gives one number, so that poses keep one numbering. off: corners alike in all they have",
+    "weld_tolerance": f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than this times R",
+    "border": "boundaries. smooth: curves. corners: curves that end at vertices of one face. "
+    "fixed: as they are",
+    "polygons": "triangles of a glTF. auto: joined to the quads that most of them are halves of, "
+    "or to polygons by FB_ngon_encoding, for Catmull-Clark. off: refined as they are",
+    "material": "refine only the faces of this material; their neighbours are cut to meet them",
+    "group": "refine only this group or object of an OBJ, or mesh of a glTF, by its name or that "
+    "of a node that shows it",
+    "compress": "how a glTF's geometry is written. meshopt: exact. draco: smaller; positions, "
+    "normals and UVs are rounded",
+    "limit": "put the vertices on the limit surface",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:

@@ -12,8 +12,8 @@ from pns_common import warm_up as warm_up_library
 from pns_common.warming import CLOSED, VERTICES
 
 from .gltf.subdivide import subdivide_gltf
+from .meshfiles.glb import triangles_glb
 from .meshfiles.mesh_file import COLOUR, Layer, of_triangles
-from .meshfiles.triangles_glb import triangles_glb
 from .options import Limits, Options
 
 

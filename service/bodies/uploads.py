@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ..errors import MediaTypeError
 from ..options import BYTES_PER_INPUT_BYTE, Limits
-from ..report import Change
 from . import media
 from .archive import open_archive
 from .multipart import sent_files
@@ -15,16 +14,11 @@ from .sibling_files import ALONE, SiblingFiles
 
 @dataclass(frozen=True)
 class Sent:
-    """A document, what it is ("glb", "gltf", "obj", …), its siblings, and what it has lost.
-
-    `parts` are primitives to refine alone that a conversion found; None: it looked for none.
-    """
+    """A document, what it is ("glb", "gltf", "obj", …), and its siblings."""
 
     data: bytes
     kind: media.Kind
     siblings: SiblingFiles = ALONE
-    losses: tuple[Change, ...] = ()
-    parts: frozenset[int] | None = None
 
 
 def sent(body: bytes, content_type: str, limits: Limits) -> Sent:

@@ -7,36 +7,20 @@ declares and does not read itself, `options_of` takes from the context.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ..options import DEFAULTS
 from ..printable import printable
 from .errors import FAILURE, explained
 from .parameters import (
     AddressOption,
-    BorderOption,
-    BudgetOption,
-    CompressOption,
-    CreaseOption,
-    DiagnosticsOption,
     EngineOption,
-    GroupOption,
-    LengthOption,
-    LevelsOption,
-    LimitOption,
-    MaterialOption,
     ModelOption,
-    NormalsOption,
-    PolygonsOption,
-    SchemeOption,
-    ToleranceOption,
-    UvOption,
-    WeldOption,
     WorkersOption,
     local_path,
     options_of,
+    takes_options,
 )
 from .systems import check_posix
 
@@ -83,6 +67,7 @@ def options(
 
 
 @app.command()
+@takes_options
 def subdivide(
     context: typer.Context,
     sources: Annotated[
@@ -103,23 +88,7 @@ def subdivide(
             help="file to write, or a folder for files called as they are; - is stdout",
         ),
     ],
-    levels: LevelsOption = DEFAULTS.levels,
-    scheme: SchemeOption = DEFAULTS.scheme,
-    budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
-    reference_length: LengthOption = "auto",
-    diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
-    uv: UvOption = DEFAULTS.uv,
-    normals: NormalsOption = DEFAULTS.normals,
-    crease: CreaseOption = DEFAULTS.crease,
-    weld: WeldOption = DEFAULTS.weld,
-    weld_tolerance: ToleranceOption = DEFAULTS.weld_tolerance,
-    border: BorderOption = DEFAULTS.border,
-    polygons: PolygonsOption = DEFAULTS.polygons,
-    material: MaterialOption = DEFAULTS.material,
-    group: GroupOption = DEFAULTS.group,
-    compress: CompressOption = DEFAULTS.compress,
-    limit: LimitOption = DEFAULTS.limit,
     report: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", parser=local_path, help="write the report of one IN too"),
@@ -131,7 +100,7 @@ def subdivide(
             metavar="FILE.npz",
             parser=local_path,
             help="write what each vertex of OUT is made of: weights of the vertices of IN, a row "
-            "each, as scipy.sparse.load_npz reads them (OBJ, PLY, STL, OFF)",
+            "each, as scipy.sparse.load_npz reads them; of a glTF for each primitive",
         ),
     ] = None,
     to: Annotated[
@@ -142,6 +111,7 @@ def subdivide(
         str | None, typer.Option("--from", metavar="FORMAT", help="format of stdin; default: glTF")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="let a result replace its input")] = False,
+    **_: Any,
 ) -> None:
     """Refine each IN; formats go by the files' endings."""
     from ..meshfiles.convert import Jobs, convert
@@ -158,6 +128,7 @@ def subdivide(
 
 
 @app.command()
+@takes_options
 def batch(
     context: typer.Context,
     source: Annotated[
@@ -165,23 +136,7 @@ def batch(
         typer.Argument(help="folder, glob or manifest (.txt, .csv, .jsonl, .parquet); path or URL"),
     ],
     dest: Annotated[str, typer.Argument(help="folder for the results; path or URL")],
-    levels: LevelsOption = DEFAULTS.levels,
-    scheme: SchemeOption = DEFAULTS.scheme,
-    budget: BudgetOption = DEFAULTS.budget,
     model: ModelOption = None,
-    reference_length: LengthOption = "auto",
-    diagnostics: DiagnosticsOption = DEFAULTS.diagnostics,
-    uv: UvOption = DEFAULTS.uv,
-    normals: NormalsOption = DEFAULTS.normals,
-    crease: CreaseOption = DEFAULTS.crease,
-    weld: WeldOption = DEFAULTS.weld,
-    weld_tolerance: ToleranceOption = DEFAULTS.weld_tolerance,
-    border: BorderOption = DEFAULTS.border,
-    polygons: PolygonsOption = DEFAULTS.polygons,
-    material: MaterialOption = DEFAULTS.material,
-    group: GroupOption = DEFAULTS.group,
-    compress: CompressOption = DEFAULTS.compress,
-    limit: LimitOption = DEFAULTS.limit,
     to: Annotated[
         str | None, typer.Option(metavar="FORMAT", help="format of the results; default: as read")
     ] = None,
@@ -194,6 +149,7 @@ def batch(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,
+    **_: Any,
 ) -> None:
     """Refine a library of files; what was done is not done again when it runs again."""
     check_posix("batch")

@@ -2,25 +2,58 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import typer
 
-from ..options import (
-    MAX_LEVELS,
-    MAX_WELD_TOLERANCE,
-    BorderRule,
-    Compression,
-    Diagnostics,
-    NormalRule,
-    Options,
-    PolygonRule,
-    SchemeName,
-    UvRule,
-    WeldRule,
-)
+from ..options import DESCRIPTIONS, Options
+
+Command = TypeVar("Command", bound=Callable[..., None])
+
+_METAVARS = {
+    "budget": "C",
+    "reference_length": "auto|X",
+    "crease": "auto|off|normals|angle:DEG",
+    "weld_tolerance": "X",
+    "material": "NAME",
+    "group": "NAME",
+}
+
+
+def takes_options(command: Command) -> Command:
+    """Give a command a parameter for each field of `Options`; `options_of` reads them.
+
+    They stand in place of its last parameter, which takes them by name.
+    """
+    own, hints = inspect.signature(command, eval_str=True), get_type_hints(Options)
+    # Typer takes no union of two types.
+    hints["reference_length"] = Any
+    made = [
+        inspect.Parameter(
+            option.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=option.default,
+            annotation=Annotated[hints[option.name], _described(option.name)],
+        )
+        for option in fields(Options)
+    ]
+    kept = [*own.parameters.values()][:-1]
+    command.__signature__ = own.replace(parameters=[*kept, *made])  # type: ignore[attr-defined]
+    return command
+
+
+def _described(name: str) -> Any:
+    flag = f"--{name.replace('_', '-')}"
+    return typer.Option(
+        flag,
+        help=DESCRIPTIONS[name],
+        metavar=_METAVARS.get(name),
+        parser=_reference_length if name == "reference_length" else None,
+    )
 
 
 def options_of(context: typer.Context) -> Options:
@@ -49,14 +82,6 @@ def _reference_length(text: str) -> float | Literal["auto"]:
         raise typer.BadParameter("it must be 'auto' or a number") from error
 
 
-LevelsOption = Annotated[
-    int, typer.Option(help=f"depth, 1 to {MAX_LEVELS}: four faces of one at each level")
-]
-SchemeOption = Annotated[
-    SchemeName,
-    typer.Option(help="the rules; auto: pns for triangles, catmull-clark for polygons"),
-]
-BudgetOption = Annotated[float | None, typer.Option(metavar="C", help="default: the model's own")]
 ModelOption = Annotated[
     str | None,
     typer.Option(
@@ -65,64 +90,6 @@ ModelOption = Annotated[
         "Default: the default model",
     ),
 ]
-LengthOption = Annotated[
-    # What the parser returns: typer takes no union of two types.
-    Any,
-    typer.Option(metavar="auto|X", parser=_reference_length, help="unit of length of the budget"),
-]
-DiagnosticsOption = Annotated[Diagnostics, typer.Option(help="what a glTF carries of the report")]
-UvOption = Annotated[UvRule, typer.Option(help="smooth: Loop's stencil inside charts")]
-NormalsOption = Annotated[
-    NormalRule,
-    typer.Option(
-        help="auto: those of the file; where a mesh has none, smooth but across sharp edges. "
-        "keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
-        "limit surface, with --limit"
-    ),
-]
-CreaseOption = Annotated[
-    str,
-    typer.Option(
-        metavar="auto|off|normals|angle:DEG",
-        help="edges to keep sharp; auto: each as sharp as the model finds it, "
-        "at two levels; normals: those that a glTF's normals make hard",
-    ),
-]
-WeldOption = Annotated[
-    WeldRule,
-    typer.Option(
-        help="which vertices are one. position: those in one place. index: those that the file "
-        "gives one number, so that poses keep one numbering. off: corners alike in all they have"
-    ),
-]
-BorderOption = Annotated[
-    BorderRule,
-    typer.Option(
-        help="boundaries. smooth: curves. corners: curves that end at vertices of one face. "
-        "fixed: as they are"
-    ),
-]
-PolygonsOption = Annotated[
-    PolygonRule,
-    typer.Option(
-        help="triangles of a glTF. auto: joined to the quads that most of them are halves of, for "
-        "Catmull-Clark. off: refined as they are"
-    ),
-]
-MaterialOption = Annotated[
-    str | None, typer.Option(metavar="NAME", help="refine only the faces of this material")
-]
-GroupOption = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help="refine only this group or object (OBJ), or mesh (glTF)"),
-]
-ToleranceOption = Annotated[
-    float,
-    typer.Option(
-        metavar="X", help=f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than X times R"
-    ),
-]
-CompressOption = Annotated[Compression, typer.Option(help="how a glTF's geometry is written")]
 EngineOption = Annotated[
     Literal["local", "ray"], typer.Option(help="processes of this machine, or a Ray cluster")
 ]
@@ -133,4 +100,3 @@ AddressOption = Annotated[
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, help="workers at a time; default: one for each processor")
 ]
-LimitOption = Annotated[bool, typer.Option("--limit", help="put the vertices on the limit surface")]

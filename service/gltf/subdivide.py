@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
@@ -23,6 +22,7 @@ from .read.references import mesh_instances
 from .read.upload import Media, Upload, read_upload
 from .refine.meshes import mostly_polygons, refined_meshes
 from .write.compression import BYTES_PER_FACE, WRITERS
+from .write.parents import Arrays, parents_of_mesh
 from .write.prune import VertexUse
 from .write.storage import (
     leave_out_ngons,
@@ -47,12 +47,14 @@ class Subdivided:
         report: the report.
         timings: seconds by stage (read, weld, refine, attributes, write).
         faces_in: faces before refinement.
+        parents: what each vertex is made of, as arrays of a file; none if not asked for.
     """
 
     glb: bytes
     report: dict[str, Any]
     timings: dict[str, float]
     faces_in: int
+    parents: Arrays = field(default_factory=dict)
 
 
 def subdivide_gltf(
@@ -63,14 +65,13 @@ def subdivide_gltf(
     limits: Limits,
     course: Course | None = None,
     siblings: SiblingFiles = ALONE,
-    losses: Sequence[Change] = (),
-    parts: frozenset[int] | None = None,
+    *,
+    traced: bool = False,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
-    `course` receives the progress. `siblings` are the files that the document may name. `losses`
-    are changes of an earlier conversion to glTF, for the report; `parts` the primitives to refine
-    that it found.
+    `course` receives the progress. `siblings` are the files that the document may name. `traced`
+    asks for the parents of vertices.
 
     Raises:
         ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
@@ -91,7 +92,7 @@ def subdivide_gltf(
             more = packing + (BYTES_PER_FACE_OF_MESH + packing) // 2
             check_cost(upload.document, upload.plans, len(data), options.levels, limits, more)
         instances = mesh_instances(upload.document)
-        changes = [*losses, *_changes_of_container(upload, options)]
+        changes = _changes_of_container(upload, options)
         changes += upload.changes + storage_changes(upload.document, upload.plans)
         writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
 
@@ -101,8 +102,9 @@ def subdivide_gltf(
     if options.selects:
         alike = {plan.mesh: list[int]() for plan in upload.plans}
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
+    parents: Arrays = {}
     with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course, parts):
+        for first in refined_meshes(upload, firsts, scheme, options, course, traced=traced):
             with course.stage("write"):
                 written = writer.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]
@@ -110,6 +112,8 @@ def subdivide_gltf(
                     writer.repeat_mesh(mesh.index, first.index, mesh.refined)
                 for mesh in (first, *later):
                     vertices.add(mesh.index, mesh.primitives, mesh.kept)
+                    if traced:
+                        parents |= parents_of_mesh(upload.document, mesh)
                     result = MeshResult(
                         index=mesh.index,
                         instances=instances[mesh.index],
@@ -136,7 +140,7 @@ def subdivide_gltf(
         pieces = writer.finish()
         glb = write_glb(encode(upload.tree), pieces, upload.container.others)
     faces_in = sum(plan.faces for plan in upload.plans)
-    return Subdivided(glb=glb, report=report, timings=course.seconds, faces_in=faces_in)
+    return Subdivided(glb, report, course.seconds, faces_in, parents)
 
 
 def make_scheme(options: Options, model: Model | None) -> Scheme:

@@ -19,30 +19,26 @@ from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.kernels import ANNOUNCEMENT, are_compiled
-from pns_common.matrix import SubdivisionMatrix
 from pns_common.model.session import Model
 from pns_common.schemes import Scheme
 
 from ..bodies.folder import folder_of
-from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, Kind, kind_of
+from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles
-from ..bodies.uploads import Sent
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError
 from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
+from ..gltf.write.parents import Arrays, matrix_arrays
 from ..options import Limits, Options
 from ..printable import printable
 from ..report import Change
 from .flatten import flatten
-from .formats import FORMATS, held
+from .formats import FORMATS, held, read_within
+from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .parts import with_group_normals
-from .polygons import refine_polygons
-from .polygons_glb import polygons_glb
 from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
-from .to_gltf import as_gltf, read_within
-from .triangles_glb import as_gltf_json
 from .triangulate import triangulated
 
 if TYPE_CHECKING:
@@ -96,7 +92,7 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
     # What only a terminal sees, workers do not load.
     from rich.console import Console
 
-    planned = _planned(jobs)
+    planned = _planned(jobs, options)
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -144,8 +140,10 @@ def _convert_one(
         sys.stdout.buffer.flush()
     else:
         replace_file(job.output, written.content)
-    if jobs.map is not None and written.parents is not None:
-        replace_file(jobs.map, _as_npz(written.parents))
+    if jobs.map is not None:
+        file = BytesIO()
+        np.savez_compressed(file, allow_pickle=False, **written.parents)
+        replace_file(jobs.map, file.getvalue())
     if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(jobs.report, text + b"\n")
@@ -156,7 +154,7 @@ def _convert_one(
     console.print(f"{name}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
 
 
-def _planned(jobs: Jobs) -> list[_Job]:
+def _planned(jobs: Jobs, options: Options) -> list[_Job]:
     """Plan what becomes of each file, before any work. Raises InvalidParameter."""
     several = len(jobs.sources) > 1
     into = jobs.output.is_dir() or (several and jobs.output != STREAM)
@@ -179,14 +177,19 @@ def _planned(jobs: Jobs) -> list[_Job]:
             ending = source.suffix if target == kind and source != STREAM else f".{target}"
             output = jobs.output / f"{stem}{ending}"
         _check_output(jobs, source, output)
-        if jobs.map is not None and {kind, target} & {*GLTF_KINDS}:
-            raise InvalidParameter(
-                "map", f"{source}: a map is of OBJ, PLY, STL and OFF, in and out"
-            )
+        if jobs.map is not None:
+            _check_map(source, kind, target, options)
         if any(output == job.output for job in planned):
             raise InvalidParameter("OUT", f"{output}: two files would be written to it")
         planned.append(_Job(source, kind, output, target))
     return planned
+
+
+def _check_map(source: Path, kind: str, target: str, options: Options) -> None:
+    if (kind in GLTF_KINDS) != (target in GLTF_KINDS):
+        raise InvalidParameter("map", f"{source}: a map needs glTF in and out, or neither")
+    if target in GLTF_KINDS and options.compress == "draco":
+        raise InvalidParameter("map", f"{source}: Draco orders vertices anew, and a map names them")
 
 
 def _check_output(jobs: Jobs, source: Path, output: Path) -> None:
@@ -215,7 +218,7 @@ def converted(
 ) -> Written:
     """Refine the bytes of a file of `kind` into those of one of `target`; no file is touched.
 
-    `traced` asks for the parents of vertices, which no glTF has.
+    `traced` asks for the parents of vertices; none of a glTF and another format.
 
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
@@ -223,72 +226,46 @@ def converted(
     course = Course() if course is None else course
     if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
-        sent = Sent(data, cast(Kind, kind), siblings)
-        return _by_gltf(sent, target, options, model, limits, course)
+        media = cast(Media, kind)
+        done = subdivide_gltf(data, media, options, model, limits, course, siblings, traced=traced)
+        written = _of_gltf(done.glb, done.report, target, limits)
+        return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
     with course.stage("read", 0.0, 0.1):
-        mesh, polygons = _taken(read_within(data, kind, limits), options, model)
-    if target in GLTF_KINDS and polygons is None:
-        sent = as_gltf(mesh, siblings, options)
-        # Files of polygons have them: what comes as triangles stays triangles.
-        options = replace(options, polygons="off")
-        return _by_gltf(sent, target, options, model, limits, course)
+        mesh, scheme = _taken(read_within(data, kind, limits), options, model)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
         if NORMAL not in mesh.layers and options.normals == "auto":
             options = replace(options, normals="smooth")
+    elif options.compress != "none":
+        mesh = mesh.with_changes([Change("", "not compressed: only a glTF is", 1)])
+        options = replace(options, compress="none")
     with course.part(0.1, 0.8):
-        scheme = make_scheme(options, model) if polygons is None else polygons
-        refined, report = (refine_mesh_file if polygons is None else refine_polygons)(
-            mesh, scheme, options, limits, course, traced=traced
-        )
+        refined, report = refine_mesh_file(mesh, scheme, options, limits, course, traced=traced)
     with course.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
-            glb, report = polygons_glb(refined, report, options, limits, siblings)
+            glb, report = as_glb(refined, report, options, siblings, course)
             written = _of_gltf(glb, report, target, limits)
-            return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
-        kept, changes = held(refined, target)
-        if options.compress != "none":
-            changes.append(Change("", "not compressed: only a glTF is", 1))
-        parents = kept.parents
-        if parents is not None and target == "stl":
-            parents = parents.take(kept.corners)
-        written = Written(
-            FORMATS[target].write(kept),
-            _with_changes(report, changes),
-            len(kept.sizes),
-            parents=parents,
-        )
+        else:
+            kept, changes = held(refined, target)
+            written = Written(
+                FORMATS[target].write(kept),
+                _with_changes(report, changes),
+                len(kept.sizes),
+                parents=_map_of(kept, target),
+            )
     return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
 
 
-def _by_gltf(
-    sent: Sent,
-    target: str,
-    options: Options,
-    model: Model | None,
-    limits: Limits,
-    course: Course,
-) -> Written:
-    """Refine a glTF into a file of `target`."""
-    done = subdivide_gltf(
-        sent.data,
-        cast(Media, sent.kind),
-        options,
-        model,
-        limits,
-        course,
-        sent.siblings,
-        sent.losses,
-        sent.parts,
-    )
-    written = _of_gltf(done.glb, done.report, target, limits)
-    return replace(written, seconds=done.timings, faces_in=done.faces_in)
+def _map_of(mesh: MeshFile, target: str) -> Arrays:
+    if mesh.parents is None:
+        return {}
+    # The vertices of an STL are its corners.
+    return matrix_arrays(mesh.parents.take(mesh.corners) if target == "stl" else mesh.parents)
 
 
-def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme | None]:
-    """Return a file's mesh, and the scheme that refines its polygons; None: it is of triangles."""
-    flat = bool((mesh.sizes == 3).all())
-    if options.scheme == "catmull-clark" or not flat:
+def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme]:
+    """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
+    if options.scheme == "catmull-clark" or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
         wants = [name for name in ("material", "group") if getattr(options, name)]
         if scheme is not None and not wants:
@@ -296,9 +273,9 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
         if options.scheme == "catmull-clark":
             raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
         if scheme is not None:
-            told = Change("", f"polygons cut into triangles, which {wants[0]} needs", 1)
-            mesh = replace(mesh, changes=(*mesh.changes, told))
-    return triangulated(mesh), None
+            told = f"polygons cut into triangles, which {wants[0]} needs"
+            mesh = mesh.with_changes([Change("", told, 1)])
+    return triangulated(mesh), make_scheme(options, model)
 
 
 def predicted_faces(
@@ -367,7 +344,7 @@ class Written:
         content, report, faces: its bytes, its report, how many faces it has.
         faces_in: how many the input has.
         seconds: what each stage took.
-        parents: the vertices of the input that each of its vertices is made of, if asked for.
+        parents: the arrays of a map of its vertices, if asked for.
     """
 
     content: bytes
@@ -375,21 +352,7 @@ class Written:
     faces: int
     seconds: dict[str, float] = field(default_factory=dict)
     faces_in: int = 0
-    parents: SubdivisionMatrix | None = None
-
-
-def _as_npz(parents: SubdivisionMatrix) -> bytes:
-    """Write a matrix as `scipy.sparse.load_npz` reads it."""
-    file = BytesIO()
-    np.savez_compressed(
-        file,
-        format=b"csr",
-        shape=parents.shape,
-        data=parents.weights,
-        indices=parents.columns,
-        indptr=parents.starts,
-    )
-    return file.getvalue()
+    parents: Arrays = field(default_factory=dict)
 
 
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:

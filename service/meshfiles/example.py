@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
+from .glb import triangles_glb
 from .mesh_file import UV, MeshFile, of_triangles
-from .triangles_glb import triangles_glb
 
 TEETH = 12
 # Along the rim each tooth has two columns in its valley and two on its crest.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 
 from pns_common.rows import disjoint_faces, unit
 
@@ -33,9 +33,9 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    joined_layer,
     of_triangles,
 )
-from .obj import as_fractions
 from .pose import joint_matrices, posed
 
 TRANSFORM, VISIBILITY = "KHR_texture_transform", "KHR_node_visibility"
@@ -69,15 +69,16 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Chang
         raise UnrefinableError("the default scene shows no triangles")
     total = sum(faces[mesh] * _copy_count(upload, node) for node, mesh in shown)
     check_limit("faces", total, limits.max_faces, f"the scene with all copies has {total} faces")
-    placed: list[_Placed] = []
+    placed, nodes = list[MeshFile](), list[str]()
     for node, mesh in shown:
         weights = _shown_weights(upload.document, node, mesh)
         joints = joint_matrices(upload, node, worlds)
         name = str(upload.tree["nodes"][node].get("name", f"node {node}"))
         for copy in _copies(upload, node):
-            where = _Where(name, worlds[node] @ copy, weights, joints)
-            placed.append(_place(upload.tree, mesh, primitives[mesh], where))
-    mesh_file = _joined(upload.tree, placed, FORMATS[kind])
+            matrix = worlds[node] @ copy
+            placed.append(_place(upload.tree, mesh, primitives[mesh], matrix, weights, joints))
+            nodes.append(name)
+    mesh_file = _joined(upload.tree, placed, nodes, FORMATS[kind])
     names = [set(p.attributes) for _, mesh in shown for p in primitives[mesh]]
     changes = _changes(upload.tree, len(placed), names, kind)
     left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
@@ -125,16 +126,14 @@ def _pointer(node: int) -> str:
 
 def _copies(upload: Upload, node: int) -> Float[np.ndarray, "N 4 4"]:
     """Return the matrices of a node's copies, in its own space: one that moves nothing without."""
-    indices = _copied(upload, node)
+    indices, count = _copied(upload, node), _copy_count(upload, node)
     values = {name: _floats(upload, indices[name]) for name in _COPY_ATTRIBUTES if name in indices}
-    matrices = np.tile(np.eye(4), (_copy_count(upload, node), 1, 1))
-    if "ROTATION" in values:
-        lengths = np.linalg.norm(values["ROTATION"], axis=1, keepdims=True)
-        matrices[:, :3, :3] = _rotations(values["ROTATION"] / np.where(lengths > 0, lengths, 1))
-    if "SCALE" in values:
-        matrices[:, :3, :3] *= values["SCALE"][:, None, :]
-    if "TRANSLATION" in values:
-        matrices[:, :3, 3] = values["TRANSLATION"]
+    still, ones = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), np.ones((count, 3))
+    quaternions = values.get("ROTATION", still)
+    lengths = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    quaternions = quaternions / np.where(lengths > 0, lengths, 1)
+    moves = values.get("TRANSLATION", np.zeros((count, 3)))
+    matrices = _placements(moves, quaternions, values.get("SCALE", ones))
     if not np.isfinite(matrices).all():
         raise GltfError("a copy is placed by NaN or infinity", pointer=_pointer(node))
     return matrices
@@ -148,15 +147,22 @@ def _floats(upload: Upload, index: int) -> Float[np.ndarray, "N K"]:
     return as_float(values, normalized=accessor.normalized).astype(np.float64)
 
 
-def _rotations(quaternions: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3 3"]:
-    """Return the matrices of unit quaternions x, y, z, w."""
+def _placements(
+    moves: Float[np.ndarray, "N 3"],
+    quaternions: Float[np.ndarray, "N 4"],
+    scales: Float[np.ndarray, "N 3"],
+) -> Float[np.ndarray, "N 4 4"]:
+    """Return matrices that scale, then rotate by quaternions x, y, z, w, then move."""
     x, y, z, w = quaternions.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    matrices = np.tile(np.eye(4), (len(moves), 1, 1))
+    matrices[:, :3, :3] = np.moveaxis(np.array(rows), 2, 0) * scales[:, None, :]
+    matrices[:, :3, 3] = moves
+    return matrices
 
 
 def _placed_nodes(tree: dict[str, Any]) -> tuple[dict[int, Float[np.ndarray, "4 4"]], set[int]]:
@@ -201,12 +207,9 @@ def _children(nodes: list[dict[str, Any]]) -> list[int]:
 def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    quaternion = np.array([node.get("rotation", (0.0, 0.0, 0.0, 1.0))], dtype=np.float64)
-    rotation = _rotations(quaternion)[0]
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)))
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix
+    given = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
+    parts = (np.array([node.get(name, usual)], dtype=np.float64) for name, usual in given)
+    return _placements(*parts)[0]
 
 
 def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
@@ -215,76 +218,58 @@ def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
     return document.meshes[mesh].weights if own is None else own
 
 
-@dataclass(frozen=True, eq=False)
-class _Where:
-    """Placement of a copy of a mesh: its node's name, its matrix, its morphs, and its joints."""
-
-    name: str
-    matrix: Float[np.ndarray, "4 4"]
-    weights: list[float]
-    joints: Float[np.ndarray, "J 4 4"] | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Placed:
-    """A mesh in the world.
-
-    Attributes:
-        name: of its node.
-        vertices, faces: closed at its seams.
-        layers: by name for each of its primitives values, or None.
-        rows: for each primitive the rows of its values at its corners.
-        materials: for each primitive its material, or NONE.
-    """
-
-    name: str
-    vertices: Float[np.ndarray, "V 3"]
-    faces: Int[np.ndarray, "F 3"]
-    layers: dict[str, list[Shaped[np.ndarray, "N K"] | None]]
-    rows: list[Int[np.ndarray, " C"]]
-    materials: list[int]
-
-
 def _place(
-    tree: dict[str, Any], mesh: int, primitives: list[TrianglePrimitive], where: _Where
-) -> _Placed:
+    tree: dict[str, Any],
+    mesh: int,
+    primitives: list[TrianglePrimitive],
+    matrix: Float[np.ndarray, "4 4"],
+    weights: list[float],
+    joints: Float[np.ndarray, "J 4 4"] | None,
+) -> MeshFile:
+    """Return a mesh in the world, closed at its seams, by its morphs and its joints."""
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
     follows = read_skin_and_morph(primitives)
-    for weight, delta in zip(where.weights, follows.deltas, strict=False):
+    for weight, delta in zip(weights, follows.deltas, strict=False):
         positions += weight * delta.astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     welded = weld(positions, faces, follows.labels)
     used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
     rows = np.empty(len(welded.points), dtype=np.int64)
     rows[welded.vertex_of[used]] = used
-    matrix = where.matrix
     world = welded.points @ matrix[:3, :3].T + matrix[:3, 3]
-    if where.joints is not None and follows.binding is not None:
-        world = posed(welded.points, follows.binding.take(rows), where.joints, placed=world)
-        matrix = where.joints[0]
+    if joints is not None and follows.binding is not None:
+        world = posed(welded.points, follows.binding.take(rows), joints, placed=world)
+        matrix = joints[0]
     # A mirroring node turns faces over; their order of corners keeps them facing outwards.
     mirrored = np.linalg.det(matrix[:3, :3]) < 0
     turn = slice(None, None, -1 if mirrored else 1)
     given = tree["meshes"][mesh]["primitives"]
     materials = [given[p.number].get("material", NONE) for p in primitives]
-    layers: dict[str, list[Shaped[np.ndarray, "N K"] | None]] = {UV: [], NORMAL: [], COLOUR: []}
-    for primitive, material in zip(primitives, materials, strict=True):
-        attributes = primitive.attributes
-        layers[UV].append(_uv(primitive, tree["materials"][material] if material >= 0 else {}))
+    columns: dict[str, list[Shaped[np.ndarray, "N K"] | None]] = {
+        UV: [
+            _uv(primitive, tree["materials"][material] if material >= 0 else {})
+            for primitive, material in zip(primitives, materials, strict=True)
+        ],
         # What a skin turns is written without: normals follow its joints one by one.
-        normals = attributes.get("NORMAL") if where.joints is None else None
-        layers[NORMAL].append(None if normals is None else _turned(normals, matrix))
-        layers[COLOUR].append(attributes.get("COLOR_0"))
+        NORMAL: [
+            _turned(p.attributes["NORMAL"], matrix)
+            if "NORMAL" in p.attributes and joints is None
+            else None
+            for p in primitives
+        ],
+        COLOUR: [p.attributes.get("COLOR_0") for p in primitives],
+    }
     for name in dict.fromkeys(n for p in primitives for n in p.attributes if n.startswith("_")):
-        layers[name] = [p.attributes.get(name) for p in primitives]
-    return _Placed(
-        where.name,
-        world,
-        welded.faces[:, turn],
-        layers,
-        [p.corners[:, turn].reshape(-1) for p in primitives],
-        materials,
-    )
+        columns[name] = [p.attributes.get(name) for p in primitives]
+    corners = [p.corners[:, turn].reshape(-1) for p in primitives]
+    layers = {
+        name: joined_layer(list(zip(values, corners, strict=True)))
+        for name, values in columns.items()
+        if any(column is not None for column in values)
+    }
+    of_face = np.repeat(materials, [len(p.corners) for p in primitives])
+    placed = of_triangles(world, welded.faces[:, turn])
+    return replace(placed, layers=layers, labels={MATERIAL: Labels((), of_face)})
 
 
 def _turned(
@@ -314,59 +299,30 @@ def _uv(primitive: TrianglePrimitive, material: dict[str, Any]) -> Float[np.ndar
     return np.column_stack([u, 1 - v])
 
 
-def _joined(tree: dict[str, Any], placed: Sequence[_Placed], form: Format) -> MeshFile:
-    """Return all copies as one mesh, with what a format has room for."""
-    names = dict.fromkeys(name for part in placed for name in part.layers)
+def _joined(
+    tree: dict[str, Any], placed: Sequence[MeshFile], names: Sequence[str], form: Format
+) -> MeshFile:
+    """Return all copies, by the names of their nodes, as one mesh that a format has room for."""
     layers: dict[str, Layer] = {}
-    for name in names:
-        if form.layers is not None and name not in form.layers:
-            continue
-        values: list[Shaped[np.ndarray, "N K"]] = []
-        rows: list[Int[np.ndarray, " C"]] = []
-        total = 0
-        for part in placed:
-            own = part.layers.get(name, [None] * len(part.rows))
-            for column, corners in zip(own, part.rows, strict=True):
-                rows.append(np.full(len(corners), NONE) if column is None else corners + total)
-                if column is not None:
-                    values.append(column)
-                    total += len(column)
-        if values:
-            layers[name] = Layer(_alike(values), np.concatenate(rows))
-    of_face = [np.full(len(part.faces), number) for number, part in enumerate(placed)]
-    labels = {OBJECT: Labels(tuple(part.name for part in placed), np.concatenate(of_face))}
-    of_face = [
-        np.full(len(corners) // 3, material)
-        for part in placed
-        for corners, material in zip(part.rows, part.materials, strict=True)
-    ]
+    for name in dict.fromkeys(name for mesh in placed for name in mesh.layers):
+        if form.layers is None or name in form.layers:
+            own = [(mesh.layers.get(name), mesh.corners) for mesh in placed]
+            layers[name] = joined_layer(
+                [(None, corners) if o is None else (o.values, o.rows) for o, corners in own]
+            )
+    counts = [len(mesh.sizes) for mesh in placed]
+    labels = {OBJECT: Labels(tuple(names), np.repeat(np.arange(len(placed)), counts))}
     materials = [
         str(entry.get("name", f"material {number}"))
         for number, entry in enumerate(tree.get("materials", []))
     ]
     if materials:
-        labels[MATERIAL] = Labels(tuple(materials), np.concatenate(of_face))
+        of_face = np.concatenate([mesh.labels[MATERIAL].of_face for mesh in placed])
+        labels[MATERIAL] = Labels(tuple(materials), of_face)
+    faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
+    made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
     labels = {kind: label for kind, label in labels.items() if kind in form.labels}
-    faces = disjoint_faces((part.faces, len(part.vertices)) for part in placed)
-    made = of_triangles(np.concatenate([part.vertices for part in placed]), faces)
-    return MeshFile(made.vertices, made.offsets, made.corners, layers, labels=labels)
-
-
-def _alike(values: list[Shaped[np.ndarray, "N K"]]) -> Shaped[np.ndarray, "M K"]:
-    """Join values of one name: colours of different types become fractions with opacity."""
-    if len({(column.dtype, column.shape[1]) for column in values}) == 1:
-        return np.concatenate(values)
-    width = max(column.shape[1] for column in values)
-    return np.concatenate(
-        [
-            np.pad(
-                as_fractions(column).astype(np.float64),
-                ((0, 0), (0, width - column.shape[1])),
-                constant_values=1.0,
-            )
-            for column in values
-        ]
-    )
+    return replace(made, layers=layers, labels=labels)
 
 
 def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:

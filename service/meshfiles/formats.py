@@ -8,23 +8,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh import repeated_vertex
+from pns_common.mesh import fans, repeated_vertex
 from pns_common.rows import distinct_rows, marked
 
 from ..errors import UnreadableError, UnrefinableError
+from ..gltf.read.plan import check_memory
 from ..meshes.far_from_origin import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
+from ..options import Limits
 from ..report import Change
-from .mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, OBJECT, SMOOTHING, UV, MeshFile
-from .obj import as_fractions, read_obj, write_obj
+from .mesh_file import (
+    COLOUR,
+    GROUP,
+    MATERIAL,
+    NORMAL,
+    OBJECT,
+    SMOOTHING,
+    UV,
+    MeshFile,
+    as_fractions,
+    shown,
+)
+from .obj import read_obj, write_obj
 from .off import read_off, write_off
 from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
 from .text import count_words
-from .triangulate import fan, triangulated
-
-_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
+from .triangulate import triangulated
 
 
 @dataclass(frozen=True)
@@ -99,6 +110,10 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
     """
     mesh = FORMATS[kind].read(data)
     count = len(mesh.vertices)
+    proper = mesh.sizes >= 3
+    if not proper.all():
+        told = "faces of fewer than three vertices dropped"
+        mesh = mesh.of_faces(proper).with_changes([Change("", told, int((~proper).sum()))])
     if len(mesh.corners) == 0:
         raise UnreadableError(f"the {kind.upper()} file has no faces of three vertices")
     if not (mesh.corners.min() >= 0 and mesh.corners.max() < count):
@@ -116,10 +131,17 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
             f"vertex {wrong[0]} of the {kind.upper()} file has a coordinate that is NaN or infinite"
         )
     unused = count - int(np.count_nonzero(used))
-    if unused:
-        told = Change("", "vertices dropped that no face uses", unused)
-        mesh = replace(mesh, changes=(*mesh.changes, told))
-    return mesh
+    told = [Change("", "vertices dropped that no face uses", unused)] if unused else []
+    return mesh.with_changes(told)
+
+
+def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
+    """Read a mesh file, if reading takes no more memory than it may.
+
+    Raises as `read_polygons`, and LimitError.
+    """
+    check_memory(memory_to_read(data, kind), limits)
+    return read_polygons(data, kind)
 
 
 def write(mesh: MeshFile, kind: str) -> bytes:
@@ -133,25 +155,21 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     Raises:
         UnrefinableError: a position beyond the range of float32, where that is all it holds.
     """
-    form = FORMATS[kind]
+    form, lost = FORMATS[kind], dict[str, int]()
     mesh = triangulated(mesh) if kind == "stl" else mesh
     why = f" dropped: not written to {kind.upper()} files"
-    layers, lost = dict(mesh.layers), dict[str, int]()
-    for name, layer in mesh.layers.items():
-        whole = kind == "obj" or layer.complete
-        if (form.layers is not None and name not in form.layers) or not whole:
-            lost[_SHOWN.get(name, f"attribute {name}")] = 1
-            del layers[name]
+    layers = {
+        name: layer
+        for name, layer in mesh.layers.items()
+        if (form.layers is None or name in form.layers)
+        # An OBJ names values corner by corner, but for colours.
+        and (layer.complete or (kind == "obj" and name != COLOUR))
+    }
+    lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
     if kind == "obj" and COLOUR in layers:
-        if layers[COLOUR].complete:
-            alpha = (
-                layers[COLOUR].values.shape[1] == 4
-                and (as_fractions(layers[COLOUR].values)[:, 3] < 1).any()
-            )
-            lost |= {"opacity of vertex colours": 1} if alpha else {}
-        else:
-            del layers[COLOUR]
-            lost[_SHOWN[COLOUR]] = 1
+        colours = as_fractions(layers[COLOUR].values)
+        if (colours[:, 3:] < 1).any():
+            lost["opacity of vertex colours"] = 1
     values = {
         name: column
         for name, column in mesh.face_values.items()
@@ -183,7 +201,7 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    faces = fan(mesh)
+    faces = mesh.corners[fans(mesh.offsets)[0]]
     after = _without_area(mesh.vertices.astype(np.float32), faces)
     # Most meshes have no such face, and then none that rounding makes.
     before = _without_area(mesh.vertices, faces) if after.any() else after

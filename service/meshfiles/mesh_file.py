@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -86,6 +87,34 @@ class MeshFile:
         """The vertices of triangles; raises ValueError where a face is none."""
         return self.corners.reshape(len(self.offsets) - 1, 3)
 
+    def with_changes(self, changes: Iterable[Change]) -> MeshFile:
+        """Return a copy of which more was dropped or mended."""
+        return replace(self, changes=(*self.changes, *changes))
+
+    def of_faces(self, keep: Bool[np.ndarray, " F"]) -> MeshFile:
+        """Return a copy of some of its faces."""
+        corner = np.repeat(keep, self.sizes)
+        return replace(
+            self,
+            offsets=offsets_of(self.sizes[keep]),
+            corners=self.corners[corner],
+            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
+            face_values={name: values[keep] for name, values in self.face_values.items()},
+            labels={k: Labels(own.names, own.of_face[keep]) for k, own in self.labels.items()},
+        )
+
+    def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
+        """Return the triangles of its faces, by the places of their corners and by their face."""
+        flat = places.reshape(-1)
+        return replace(
+            self,
+            offsets=np.arange(0, len(flat) + 1, 3),
+            corners=self.corners[flat],
+            layers={name: Layer(own.values, own.rows[flat]) for name, own in self.layers.items()},
+            face_values={name: values[face] for name, values in self.face_values.items()},
+            labels={k: Labels(own.names, own.of_face[face]) for k, own in self.labels.items()},
+        )
+
 
 def of_triangles(
     vertices: Float[np.ndarray, "V 3"],
@@ -98,6 +127,40 @@ def of_triangles(
     given = {NORMAL: normals, UV: uv}
     layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
+
+
+def shown(layer: str) -> str:
+    """Return what users call a layer."""
+    known = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
+    return known.get(layer, f"attribute {layer}")
+
+
+def as_fractions(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions of 1, whatever type stores them."""
+    return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
+
+
+def joined_layer(
+    parts: Sequence[tuple[Shaped[np.ndarray, "N K"] | None, Int[np.ndarray, " C"]]],
+) -> Layer:
+    """Join values of one name, some of which a part has, and the rows of all corners.
+
+    Colours of different types become fractions with opacity.
+    """
+    given = [values for values, _ in parts if values is not None]
+    rows: list[Int[np.ndarray, " C"]] = []
+    total = 0
+    for values, own in parts:
+        rows.append(np.where((own < 0) | (values is None), NONE, own + total))
+        total += 0 if values is None else len(values)
+    if len({(values.dtype, values.shape[1]) for values in given}) > 1:
+        width = max(values.shape[1] for values in given)
+        wide = [((0, 0), (0, width - values.shape[1])) for values in given]
+        given = [
+            np.pad(as_fractions(values).astype(np.float64), pad, constant_values=1.0)
+            for values, pad in zip(given, wide, strict=True)
+        ]
+    return Layer(np.concatenate(given), np.concatenate(rows))
 
 
 def offsets_of(sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " F1"]:

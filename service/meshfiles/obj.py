@@ -27,12 +27,12 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    as_fractions,
     dropped,
     offsets_of,
 )
 from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
 
-SIDES = "faces of fewer than three vertices"
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
 _LIBRARY = b"mtllib"
 _DROPPED = {
@@ -70,12 +70,6 @@ def read_obj(data: bytes) -> MeshFile:
         why = "they count from 1" if name == 0 else f"there are {there}"
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
-    proper = sizes >= 3
-    lost[SIDES] = int((~proper).sum())
-    if lost[SIDES]:
-        of_proper = np.repeat(proper, sizes)
-        v, vt, vn = v[of_proper], vt[of_proper], vn[of_proper]
-        sizes, line = sizes[proper], line[proper]
     layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)
@@ -263,11 +257,6 @@ def write_obj(mesh: MeshFile) -> bytes:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
     pieces += _faces_text(mesh, uv, normals)
     return "".join(pieces).encode()
-
-
-def as_fractions(values: np.ndarray) -> np.ndarray:
-    """Return colours as fractions of 1, whatever type stores them."""
-    return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
 
 
 def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iterator[str]:

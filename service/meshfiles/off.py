@@ -14,7 +14,6 @@ from ..errors import UnreadableError
 from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
 from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
-SIDES = "faces of fewer than three vertices"
 # The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0". Or they
 # stand alone: Geomview asks for no header.
 _HEADER = re.compile(
@@ -57,15 +56,13 @@ def read_off(data: bytes) -> MeshFile:
     if widths[COLOUR] not in (0, 3, 4):
         lost["values of vertices"] = vertex_count
         del parts[COLOUR]
-    proper = sizes >= 3
-    lost[SIDES] = int((~proper).sum())
     face_values: dict[str, np.ndarray] = {}
     if of_faces is None:
         lost["colours of faces"] = face_count
     elif of_faces.shape[1] > 0:
-        face_values[COLOUR] = _colours(of_faces[proper])
+        face_values[COLOUR] = _colours(of_faces)
     layers = {
-        name: Layer(parts[name], corners[np.repeat(proper, sizes)])
+        name: Layer(parts[name], corners)
         for name in (NORMAL, COLOUR, UV)
         if name in parts and widths[name]
     }
@@ -73,8 +70,8 @@ def read_off(data: bytes) -> MeshFile:
         layers[COLOUR] = Layer(_colours(layers[COLOUR].values), layers[COLOUR].rows)
     return MeshFile(
         parts[""],
-        offsets_of(sizes[proper]),
-        corners[np.repeat(proper, sizes)],
+        offsets_of(sizes),
+        corners,
         layers,
         face_values=face_values,
         changes=dropped(lost),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Int, Shaped
+from jaxtyping import Bool, Int
 
 from pns_common.matrix import SubdivisionMatrix
 from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
@@ -20,22 +20,21 @@ from ..meshes.weld import canonical_zero
 from ..options import Options
 from ..report import Change
 from .mesh_file import (
-    COLOUR,
     GROUP,
     MATERIAL,
     NONE,
     NORMAL,
     OBJECT,
     SMOOTHING,
-    UV,
     Labels,
     Layer,
     MeshFile,
+    joined_layer,
     of_triangles,
+    shown,
 )
 from .triangulate import area_vectors
 
-_SHOWN = {UV: "texture coordinates", NORMAL: "vertex normals", COLOUR: "vertex colours"}
 LARGEST = float(np.finfo(np.float32).max)
 _SMOOTH_OFF = frozenset({"off", "0", ""})
 
@@ -76,18 +75,15 @@ def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None
     return chosen
 
 
-def parts_of(
-    mesh: MeshFile, chosen: Bool[np.ndarray, " F"] | None = None
-) -> tuple[list[Part], list[Change]]:
-    """Divide triangles by material, in the order in which materials occur, and by being chosen.
+def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
+    """Divide triangles by material, in the order in which materials occur.
 
     A part has the layers that all of its corners have; what others lose is reported.
     """
     materials = mesh.labels.get(MATERIAL)
     count = len(mesh.faces)
     of_face = np.zeros(count, dtype=np.int64) if materials is None else materials.of_face + 1
-    key = of_face if chosen is None else 2 * of_face + chosen
-    order, first = number_by_first_appearance(key)
+    order, first = number_by_first_appearance(of_face)
     parts: list[Part] = []
     lost: dict[str, int] = {}
     for number, place in enumerate(first.tolist()):
@@ -106,14 +102,14 @@ def _primitive(
     for name, layer in mesh.layers.items():
         rows = layer.rows[corners]
         some = rows >= 0
-        shown = _SHOWN.get(name, f"attribute {name}")
+        what = shown(name)
         if not some.any():
             continue
         if not some.all():
-            shown += " that not all corners of a material have"
-            lost[shown] = lost.get(shown, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
+            what += " that not all corners of a material have"
+            lost[what] = lost.get(what, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
         elif not (np.abs(layer.values) <= LARGEST).all():
-            lost[f"{shown}, of which some are no numbers of float32,"] = len(faces)
+            lost[f"{what}, of which some are no numbers of float32,"] = len(faces)
         else:
             layers[name] = Layer(layer.values, rows)
     vertex = mesh.corners[corners]
@@ -203,35 +199,22 @@ def joined(
     order = slice(None) if len(refined) == 1 else np.argsort(ranks, kind="stable")
     ranks = ranks[order]
 
-    def ordered(rows: list[np.ndarray]) -> Int[np.ndarray, " C"]:
-        return np.concatenate(rows)[order].reshape(-1)
-
     ids = [primitive.vertex for primitive in refined if primitive.vertex is not None]
     used = np.flatnonzero(marked(np.concatenate(ids), 1 + max(int(own.max()) for own in ids)))
     ids = [np.searchsorted(used, own) for own in ids]
     vertices = np.empty((len(used), 3))
     for own, primitive in zip(ids, refined, strict=True):
         vertices[own] = primitive.attributes["POSITION"]
-    corners = ordered([own[p.faces] for own, p in zip(ids, refined, strict=True)])
+    corners = np.concatenate([own[p.faces] for own, p in zip(ids, refined, strict=True)])[order]
     layers: dict[str, Layer] = {}
     for name in dict.fromkeys(name for p in refined for name in p.attributes if name != "POSITION"):
-        values: list[Shaped[np.ndarray, "N K"]] = []
-        rows: list[np.ndarray] = []
-        total = 0
-        for primitive in refined:
-            own = primitive.attributes.get(name)
-            rows.append(
-                np.full(primitive.faces.shape, NONE) if own is None else primitive.faces + total
-            )
-            if own is not None:
-                values.append(own)
-                total += len(own)
-        layers[name] = Layer(np.concatenate(values), ordered(rows))
+        own = joined_layer([(p.attributes.get(name), p.faces.reshape(-1)) for p in refined])
+        layers[name] = Layer(own.values, own.rows.reshape(-1, 3)[order].reshape(-1))
     labels = {
         kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
     }
     return replace(
-        of_triangles(vertices, corners.reshape(-1, 3)),
+        of_triangles(vertices, corners),
         layers=layers,
         face_values={name: values[ranks] for name, values in mesh.face_values.items()},
         labels=labels,

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from struct import unpack_from
+from typing import Any
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Float, Int, Shaped
 
 from ..errors import UnreadableError
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
@@ -24,7 +25,6 @@ POLYGON = frozenset({"vertex_index", "vertex_indices"})
 STRIPS = "tristrips"
 # Two numbers for each of a face's corners.
 CORNER_UV = "texcoord"
-SIDES = "faces of fewer than three vertices"
 
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {
@@ -145,7 +145,7 @@ def read_ply(data: bytes) -> MeshFile:
         # A byte-order mark, or wide letters: a text.
         data = plain_text(data).lstrip()
     header = ply_header(data)
-    tables = _text_tables(data, header) if header.order is None else _binary_tables(data, header)
+    tables = _tables(data, header)
     vertex, vertex_lists = _apart(tables.get("vertex", {}))
     if not {"x", "y", "z"} <= vertex.keys():
         raise UnreadableError("the PLY file has no vertices with x, y and z")
@@ -160,28 +160,25 @@ def read_ply(data: bytes) -> MeshFile:
     polygons = next((lists[name] for name in POLYGON if name in lists), None)
     if polygons is None or not len(polygons.sizes):
         sizes, corners = _of_strips(tables.get(STRIPS, {}))
-        face, lists, proper = {}, {}, np.ones(len(sizes), dtype=bool)
+        face, lists = {}, {}
     else:
         sizes, corners = polygons.sizes, polygons.values.astype(np.int64)
-        proper = sizes >= 3
-        lost[SIDES] = int((~proper).sum())
-        corners = corners[np.repeat(proper, sizes)]
     layers = {name: Layer(values, corners) for name, values in _layers(vertex).items()}
     for name in lists.keys() - POLYGON - {CORNER_UV}:
         lost[f"face property {name}"] += len(sizes)
     corner_uv = lists.get(CORNER_UV)
     if corner_uv is not None:
         if (corner_uv.sizes == 2 * sizes).all():
-            values = corner_uv.values.reshape(-1, 2)[np.repeat(proper, sizes)]
+            values = corner_uv.values.reshape(-1, 2)
             layers[UV] = Layer(values.astype(np.float64), np.arange(len(values)))
         else:
             lost["texture coordinates that not all corners have"] += len(sizes)
     return MeshFile(
         vertices,
-        offsets_of(sizes[proper]),
+        offsets_of(sizes),
         corners,
         layers,
-        _face_values({name: column[proper] for name, column in face.items()}),
+        _face_values(face),
         double=any(
             one.name == "x" and one.kind == "f8"
             for element in header.elements
@@ -241,7 +238,7 @@ def _of_strips(strips: _Columns) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray,
     return np.full(len(triangles), 3), triangles.reshape(-1)
 
 
-def _text_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
+def _numbers(data: bytes, header: PlyHeader) -> Float[np.ndarray, " N"]:
     """Read a text: numbers count, wherever its lines end."""
     body = plain_text(data[header.end :])
     if b"comment" in body or b"obj_info" in body:
@@ -250,133 +247,101 @@ def _text_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
     if len(numbers) != count_words(body):
         text = cut_text(body, "PLY", plain_text(data[: header.end]).count(b"\n"))
         numbers = text.numbers(np.arange(len(text.begins)))
-
-    def length(at: int, _: str) -> int:
-        return int(numbers[at])
-
-    def taken(places: Int[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
-        return _typed(numbers[places], kind)
-
-    return _tables(header, _Store(0, len(numbers), lambda _: 1, length, taken))
+    return numbers
 
 
-def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
-    letters, order = np.frombuffer(data, dtype=np.uint8), header.order or "<"
-    names = {"<": "little", ">": "big"}
+def _tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
+    """Read the elements; a text is read as a binary file of doubles."""
+    at, text = header.end, header.order is None
+    if text:
+        data, at = _numbers(data, header).tobytes(), 0
 
-    def length(at: int, kind: str) -> int:
-        if kind == "u1":
-            return data[at]
-        part = data[at : at + int(kind[1])]
-        return int.from_bytes(part, names[order], signed=kind[0] == "i")  # type: ignore[arg-type]
+    def dtype_of(kind: str) -> np.dtype:
+        return np.dtype("f8" if text else f"{header.order}{kind}")
 
-    def taken(places: Int[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
-        width = int(kind[1])
-        step = int(places[1] - places[0]) if len(places) > 1 else width
-        if len(places) and places[-1] - places[0] == step * (len(places) - 1) and step >= width:
-            # Evenly spaced in most files: no index for each byte.
-            view = np.ndarray(len(places), order + kind, data, int(places[0]), (step,))
-            if (np.diff(places) == step).all():
-                return view.astype(kind)
-        parts = letters[places[:, None] + np.arange(width)].reshape(-1)
-        return parts.view(order + kind).astype(kind)
-
-    return _tables(header, _Store(header.end, len(data), lambda kind: int(kind[1]), length, taken))
-
-
-@dataclass(frozen=True)
-class _Store:
-    """Numbers to be read: words of a text, or bytes.
-
-    Attributes:
-        begin, end: the places of the first number and behind the last.
-        width: how many places a number of a type takes.
-        length: returns the length of a list, whose count is at a place.
-        taken: returns the numbers of a type at places.
-    """
-
-    begin: int
-    end: int
-    width: Callable[[str], int]
-    length: Callable[[int, str], int]
-    taken: Callable[[Int[np.ndarray, " N"], str], Shaped[np.ndarray, " N"]]
-
-
-def _tables(header: PlyHeader, store: _Store) -> dict[str, _Columns]:
+    typed = _typed if text else np.ndarray.astype
     tables: dict[str, _Columns] = {}
-    at = store.begin
     for element in header.elements:
-        tables[element.name], at = _columns(element, at, store)
+        stored = [
+            (None if own.count_kind is None else dtype_of(own.count_kind), dtype_of(own.kind))
+            for own in element.properties
+        ]
+        columns, at = _columns(element, stored, data, at)
+        tables[element.name] = {
+            own.name: _List(values.sizes, typed(values.values, own.kind))
+            if own.count_kind
+            else typed(values.values, own.kind)
+            for own, values in zip(element.properties, columns, strict=True)
+        }
     return tables
 
 
-def _columns(element: Element, at: int, store: _Store) -> tuple[_Columns, int]:
-    """Read the rows of an element from a place on; return also where they end."""
-    begins, sizes, end = _places(element, at, store)
-    columns: _Columns = {}
-    for own, begin, size in zip(element.properties, begins, sizes, strict=True):
-        if own.count_kind is None:
-            columns[own.name] = store.taken(begin, own.kind)
-            continue
-        width = store.width(own.kind)
-        firsts = np.repeat(begin - width * (np.cumsum(size) - size), size)
-        columns[own.name] = _List(
-            size, store.taken(firsts + width * np.arange(len(firsts)), own.kind)
-        )
-    return columns, end
+_Stored = list[tuple["np.dtype | None", np.dtype]]
 
 
-def _places(
-    element: Element, at: int, store: _Store
-) -> tuple[list[Int[np.ndarray, " N"]], list[Int[np.ndarray, " N"]], int]:
-    """Return where each property's numbers begin in each row, how many, and where all end."""
-    widths = [store.width(own.kind) for own in element.properties]
-    heads = [0 if p.count_kind is None else store.width(p.count_kind) for p in element.properties]
-    own = list(zip(element.properties, widths, heads, strict=True))
-    rows, first = element.rows, _row(own, at, store) if element.rows else [1] * len(own)
-    if not own:
-        return [], [], at
-    if first is not None:
-        # Where all lists are as long as the first row's, all rows are.
-        spans = [head + width * size for (_, width, head), size in zip(own, first, strict=True)]
-        inside = np.cumsum([0, *spans])
-        whole = at + rows * int(inside[-1])
-        starts = at + int(inside[-1]) * np.arange(rows if whole <= store.end else 0)
-        if whole <= store.end and all(
-            kind.count_kind is None or (store.taken(starts + begin, kind.count_kind) == size).all()
-            for (kind, _, _), begin, size in zip(own, inside, first, strict=False)
+def _columns(element: Element, stored: _Stored, data: bytes, at: int) -> tuple[list[_List], int]:
+    """Read each property of the rows from a place on; return also where they end."""
+    first = _row(stored, data, at) if element.rows else [(at, 0) for _ in stored]
+    if first is None:
+        raise _too_short(element, 0)
+    # Where all lists are as long as the first row's, all rows are alike.
+    fields: list[Any] = []
+    for number, ((count, kind), (_, size)) in enumerate(zip(stored, first, strict=True)):
+        fields += [] if count is None else [(f"n{number}", count)]
+        fields.append((f"v{number}", kind, (size,)))
+    record = np.dtype(fields)
+    end = at + element.rows * record.itemsize
+    if end <= len(data):
+        table = np.ndarray(element.rows if stored else 0, record, data, at)
+        sizes = [np.full(len(table), size) for _, size in first]
+        if all(
+            (table[f"n{number}"] == sizes[number]).all()
+            for number, (count, _) in enumerate(stored)
+            if count is not None
         ):
-            places = [starts + b + head for b, (_, _, head) in zip(inside, own, strict=False)]
-            return places, [np.full(rows, size) for size in first], whole
-    begins: list[list[int]] = [[] for _ in own]
-    sizes: list[list[int]] = [[] for _ in own]
+            values = [table[f"v{number}"].reshape(-1) for number in range(len(stored))]
+            return [_List(*own) for own in zip(sizes, values, strict=True)], end
+    begins: list[list[int]] = [[] for _ in stored]
+    lengths: list[list[int]] = [[] for _ in stored]
     # One by one: each row begins where another ends.
-    for row in range(rows):
-        found = _row(own, at, store)
+    for row in range(element.rows):
+        found = _row(stored, data, at)
         if found is None:
             raise _too_short(element, row)
-        for number, size in enumerate(found):
-            at += heads[number]
-            begins[number].append(at)
-            sizes[number].append(size)
-            at += widths[number] * size
-    return [np.array(b) for b in begins], [np.array(s) for s in sizes], at
+        for number, (begin, size) in enumerate(found):
+            begins[number].append(begin)
+            lengths[number].append(size)
+        at = found[-1][0] + found[-1][1] * stored[-1][1].itemsize
+    return [
+        _gathered(data, kind, np.array(begin), np.array(size))
+        for (_, kind), begin, size in zip(stored, begins, lengths, strict=True)
+    ], at
 
 
-def _row(own: list[tuple[Property, int, int]], at: int, store: _Store) -> list[int] | None:
-    """Return how many numbers each property has in the row at a place; None if it is cut off."""
-    sizes: list[int] = []
-    for kind, width, head in own:
+def _row(stored: _Stored, data: bytes, at: int) -> list[tuple[int, int]] | None:
+    """Return where the numbers of each property of a row begin, and how many; None if cut off."""
+    found: list[tuple[int, int]] = []
+    for count, kind in stored:
         size = 1
-        if kind.count_kind is not None:
-            if at + head > store.end:
+        if count is not None:
+            if at + count.itemsize > len(data):
                 return None
-            size = store.length(at, kind.count_kind)
-        at += head + width * size
-        if size < 0 or at > store.end:
-            return None
-        sizes.append(size)
-    return sizes
+            (size,) = unpack_from(f"{count.str[0]}{count.char}".replace("|", "="), data, at)
+            if not 0 <= size <= len(data):
+                return None
+            at += count.itemsize
+        found.append((at, int(size)))
+        at += int(size) * kind.itemsize
+    return found if at <= len(data) else None
+
+
+def _gathered(
+    data: bytes, kind: np.dtype, begins: Int[np.ndarray, " N"], sizes: Int[np.ndarray, " N"]
+) -> _List:
+    firsts = np.repeat(begins - kind.itemsize * (np.cumsum(sizes) - sizes), sizes)
+    places = firsts + kind.itemsize * np.arange(len(firsts))
+    letters = np.frombuffer(data, dtype=np.uint8)
+    return _List(sizes, letters[places[:, None] + np.arange(kind.itemsize)].reshape(-1).view(kind))
 
 
 def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:

@@ -7,35 +7,35 @@ stay one, so seams stay seams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int
 
+from pns_common.columns import level_topologies
 from pns_common.creases import Creases
-from pns_common.errors import MeshError
 from pns_common.mesh import Mesh
 from pns_common.normals import angle_weighted_normals, smooth_fans
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine
+from pns_common.report import Report
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
-from pns_common.topology import EdgeClass, Topology, build_topology
 
-from ..advice import count_bends
+from ..advice import Bends, count_bends
 from ..course import Course
 from ..errors import UnrefinableError
+from ..gltf.refine.attributes import in_type_of
 from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.near_misses import near_miss_changes, near_misses
 from ..gltf.refine.normals import safe_unit
+from ..gltf.refine.polygons import PolygonSplit
 from ..meshes.shape_creases import creases_by_shape
+from ..meshes.uv_charts import refined_charts
 from ..meshes.weld import Weld, weld, weld_by_label
 from ..meshes.weld_tolerance import weld_within
-from ..options import Limits, Options
-from ..report import Change, MeshResult, build_report
+from ..options import Options
+from ..report import Change
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
-from .parts import with_group_normals
-from .refine_mesh_file import check_cost
 
 # All four triangles of a quad: its normal does not depend on a diagonal.
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -60,50 +60,76 @@ class _Control:
     near: int
 
 
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A refined mesh file.
+
+    Attributes:
+        mesh: the mesh.
+        corners: vertices of the file that were refined, one or more times each.
+        primitives: how many it was refined as.
+        degenerate: number of faces without three different vertices.
+        copies: number of faces with the vertices of an earlier face.
+        report: the operator's.
+        bends: bent edges, and the sharp ones among them.
+        changes: what was joined or dropped.
+    """
+
+    mesh: MeshFile
+    corners: Int[np.ndarray, " C"]
+    primitives: int
+    degenerate: int
+    copies: int
+    report: Report
+    bends: Bends
+    changes: list[Change]
+
+
 def refine_polygons(
-    mesh: MeshFile,
-    scheme: Scheme,
-    options: Options,
-    limits: Limits,
-    course: Course,
-    *,
-    traced: bool = False,
-) -> tuple[MeshFile, dict[str, Any]]:
-    """Refine polygons; return also the report. `traced` asks for the parents of vertices.
+    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+) -> Refined:
+    """Refine polygons; `traced` asks for the parents of vertices.
 
     Raises:
-        LimitError: over `max_faces` or `max_memory_bytes`.
-        UnrefinableError: no face of three different vertices, or one that cannot be refined.
+        MeshError: a face cannot be refined.
+        UnrefinableError: no face of three different vertices.
     """
-    check_cost(mesh, options, limits)
-    shaded = with_group_normals(mesh)
     with course.stage("weld", 0.0, 0.1):
-        control = _control(shaded, options)
-        creases = _creases(control, shaded, options, scheme)
+        control = _control(mesh, options)
+        creases = _creases(control, mesh, options, scheme)
     with course.stage("refine", 0.1, 0.7):
-        try:
-            made = refine(
-                control.mesh,
-                scheme,
-                options.levels,
-                options.reference_length,
-                limit=options.limit,
-                creases=creases,
-                progress=lambda done, total: course.reach(done / total),
-            )
-        except MeshError as error:
-            raise UnrefinableError(str(error)) from error
+        made = refine(
+            control.mesh,
+            scheme,
+            options.levels,
+            options.reference_length,
+            limit=options.limit,
+            creases=creases,
+            progress=lambda done, total: course.reach(done / total),
+        )
     with course.stage("attributes", 0.7, 1.0):
-        refined = _with_layers(shaded, control, made, options)
-        if NORMAL not in mesh.layers and options.normals in ("auto", "keep"):
-            layers = {name: own for name, own in refined.layers.items() if name != NORMAL}
-            refined = replace(refined, layers=layers)
-    parents = None
+        refined = _with_layers(mesh, control, creases, made, options)
     if traced:
-        parents = made.parents
-        shape = (parents.shape[0], len(mesh.vertices))
+        parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
-    return replace(refined, parents=parents), _report(mesh, control, creases, made, options)
+        refined = replace(refined, parents=parents)
+    (misses,) = near_misses(control.mesh, [made.reference_length])
+    told = {
+        "vertices joined within weld_tolerance": control.near,
+        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
+    }
+    changes = [Change("", what, count) for what, count in told.items() if count]
+    refined_faces = np.isin(np.repeat(np.arange(len(mesh.sizes)), mesh.sizes), control.faces)
+    return Refined(
+        mesh=refined,
+        corners=mesh.corners[refined_faces],
+        primitives=1,
+        degenerate=len(mesh.sizes) - len(control.faces),
+        copies=0,
+        report=made.report,
+        bends=count_bends(control.mesh, creases)[0],
+        changes=[*changes, *near_miss_changes(misses, "")],
+    )
 
 
 def _control(mesh: MeshFile, options: Options) -> _Control:
@@ -121,10 +147,7 @@ def _control(mesh: MeshFile, options: Options) -> _Control:
     places = np.flatnonzero(kept)
     number, first = number_by_first_appearance(corner[places])
     points = welded.points[corner[places[first]]]
-    try:
-        made = Mesh(points, (number, offsets_of(sizes[faces])))
-    except MeshError as error:
-        raise UnrefinableError(str(error)) from error
+    made = Mesh(points, (number, offsets_of(sizes[faces])))
     return _Control(made, places, faces, mesh.corners[places[first]], near)
 
 
@@ -167,14 +190,16 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
     return edges[hard]
 
 
-def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
+def _with_layers(
+    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
+) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners = made.mesh.corners
     counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
     of_face = np.repeat(control.faces, counts)
     layers: dict[str, Layer] = {}
     for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, options)
+        layers[name] = _refined(name, layer, control, creases, options)
     if options.normals == "smooth":
         layers[NORMAL] = _smooth_normals(made)
     elif NORMAL in layers:
@@ -198,46 +223,31 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
     )
 
 
-def _refined(name: str, layer: Layer, control: _Control, options: Options) -> Layer:
+def _refined(
+    name: str, layer: Layer, control: _Control, creases: Creases, options: Options
+) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
     values, offsets = layer.values, control.mesh.offsets
     bare = np.logical_or.reduceat(rows < 0, offsets[:-1])
-    label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
-    number, first = number_by_first_appearance(label)
-    column = values[np.maximum(rows[first], 0)]
-    topology = build_topology((number, offsets), len(first))
-    for depth in range(options.levels):
-        if depth:
-            topology = CATMULL_CLARK.split(topology, Blocks())
-        column = _placed(name, column, topology, smooth=name == UV and options.uv == "smooth")
-    corners = CATMULL_CLARK.faces(topology, Blocks(), np.int64).reshape(-1)
+    if name == UV and options.uv == "smooth":
+        asked = values[np.maximum(rows, 0)], control.mesh.corners, offsets, options.levels
+        column, corners = refined_charts(*asked, creases, CATMULL_CLARK)
+    else:
+        label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
+        number, first = number_by_first_appearance(label)
+        column = values[np.maximum(rows[first], 0)]
+        whole, faces = column.dtype.kind != "f" and name != COLOUR, (number, offsets)
+        levels = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
+        for split in map(PolygonSplit, levels):
+            column = split.nearest(column) if whole else split.linear(column)
+        corners = PolygonSplit(levels[-1]).quads
+    corners = corners.reshape(-1)
     if bare.any():
         counts = 4 * np.diff(offsets) * 4 ** (options.levels - 1)
         corners = np.where(np.repeat(bare, counts), NONE, corners)
-    if column.dtype != values.dtype:
-        column = np.rint(column) if values.dtype.kind in "ui" else column
-    return Layer(column.astype(values.dtype), corners)
-
-
-def _placed(
-    name: str, column: Shaped[np.ndarray, "N K"], mesh: Topology, *, smooth: bool
-) -> Shaped[np.ndarray, "M K"]:
-    """Return values at old vertices, edges and faces: linear, or those of whole numbers."""
-    a, b = mesh.edges.T
-    starts = mesh.offsets[:-1]
-    if column.dtype.kind != "f" and name != COLOUR:
-        return np.concatenate([column, column[a], column[mesh.corners[starts]]])
-    column = column.astype(np.float64)
-    if smooth:
-        rim = mesh.edges[mesh.edge_class != EdgeClass.INTERIOR].reshape(-1)
-        made = CATMULL_CLARK.place(column, mesh, Blocks(available_threads()))
-        made[rim] = column[rim]
-        return made
-    sums = np.add.reduceat(column[mesh.corners], starts, axis=0)
-    return np.concatenate(
-        [column, (column[a] + column[b]) / 2, sums / np.diff(mesh.offsets)[:, None]]
-    )
+    column = column if column.dtype == values.dtype else in_type_of(values, column)
+    return Layer(column, corners)
 
 
 def _normals(
@@ -264,34 +274,3 @@ def _smooth_normals(made: Refinement) -> Layer:
     triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     fans = smooth_fans(triangles, len(vertices), sharp).reshape(-1, 6)
     return _normals(vertices, quads, fans[:, [0, 1, 2, 5]].reshape(-1))
-
-
-def _report(
-    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
-) -> dict[str, Any]:
-    (misses,) = near_misses(control.mesh, [made.reference_length])
-    told = {
-        "vertices joined within weld_tolerance": control.near,
-        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
-    }
-    changes = [*mesh.changes, *(Change("", what, count) for what, count in told.items() if count)]
-    used = len(np.unique(mesh.corners))
-    lost = used - len(np.unique(mesh.corners[np.isin(_faces_of(mesh), control.faces)]))
-    result = MeshResult(
-        index=0,
-        instances=1,
-        primitives=1,
-        vertices=len(made.mesh.vertices),
-        faces=made.mesh.face_count,
-        degenerate=len(mesh.sizes) - len(control.faces),
-        copies=0,
-        report=made.report,
-        bends=count_bends(control.mesh, creases)[0],
-    )
-    changes += near_miss_changes(misses, "")
-    return build_report(made.scheme, options.levels, [result], lost, changes)
-
-
-def _faces_of(mesh: MeshFile) -> Int[np.ndarray, " C"]:
-    """Return the face of each corner."""
-    return np.repeat(np.arange(len(mesh.sizes)), mesh.sizes)

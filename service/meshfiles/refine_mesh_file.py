@@ -22,10 +22,12 @@ from ..gltf.read.plan import (
     check_memory,
 )
 from ..gltf.refine.meshes import refine_alone, stage_shares
+from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
 from .mesh_file import NORMAL, MeshFile
 from .parts import chosen_of, joined, parts_of, with_group_normals
+from .polygons import Refined, refine_polygons
 
 
 def refine_mesh_file(
@@ -37,63 +39,77 @@ def refine_mesh_file(
     *,
     traced: bool = False,
 ) -> tuple[MeshFile, dict[str, Any]]:
-    """Refine triangles; return also the report.
+    """Refine triangles, or polygons where the scheme is one of polygons; return also the report.
 
     `normals=auto` keeps normals, and adds none to a mesh without. `traced` asks for the parents of
     vertices.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
-        UnrefinableError: no face that has an area.
+        UnrefinableError: no face that has an area, or one that cannot be refined.
     """
     course = Course() if course is None else course
     check_cost(mesh, options, limits)
     if options.normals == "auto":
         options = replace(options, normals="keep")
-    shaded = with_group_normals(mesh)
-    parts, incomplete = parts_of(shaded)
-    plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
-    primitives = [part.primitive for part in parts]
-    chosen = chosen_of(mesh, options)
-    own = None if chosen is None else [chosen[part.faces] for part in parts]
-    shares = stage_shares(scheme, options)
+    refine = refine_polygons if scheme.base.polygons else _refine_triangles
     try:
-        made = refine_alone(
-            plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
-        )
+        made = refine(with_group_normals(mesh), scheme, options, course, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
-    if made.report is None:
-        raise UnrefinableError("no face has three different vertices")
-    parents = made.parents
-    if parents is not None:
-        parents = replace(parents, shape=(parents.shape[0], len(mesh.vertices)))
-    refined = joined(mesh, parts, made.kept, made.refined, options.levels, parents)
     if NORMAL not in mesh.layers and options.normals == "keep":
         # Those that smoothing groups gave: these stay themselves.
-        refined = replace(
-            refined, layers={n: own for n, own in refined.layers.items() if n != NORMAL}
-        )
+        layers = {name: own for name, own in made.mesh.layers.items() if name != NORMAL}
+        made = replace(made, mesh=replace(made.mesh, layers=layers))
     result = MeshResult(
         index=0,
         instances=1,
-        primitives=len(made.refined),
-        vertices=len(refined.vertices),
-        faces=len(refined.faces),
+        primitives=made.primitives,
+        vertices=len(made.mesh.vertices),
+        faces=len(made.mesh.sizes),
         degenerate=made.degenerate,
         copies=made.copies,
         report=made.report,
         bends=made.bends,
     )
-    kept = np.concatenate(
-        [mesh.faces[part.faces[keep]] for part, keep in zip(parts, made.kept, strict=True)]
+    used = marked(mesh.corners, len(mesh.vertices))
+    used[made.corners] = False
+    changes = [*mesh.changes, *made.changes]
+    report = build_report(scheme, options.levels, [result], int(used.sum()), changes)
+    return made.mesh, report
+
+
+def _refine_triangles(
+    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+) -> Refined:
+    parts, incomplete = parts_of(mesh)
+    plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
+    primitives = [part.primitive for part in parts]
+    chosen = chosen_of(mesh, options)
+    own = None if chosen is None else [chosen[part.faces] for part in parts]
+    shares = stage_shares(scheme, options)
+    made = refine_alone(
+        plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
     )
-    count = len(mesh.vertices)
-    unused = int(marked(mesh.corners, count).sum()) - int(marked(kept.reshape(-1), count).sum())
-    # There is no document for a pointer to point into.
-    found = [replace(change, pointer="") for change in made.changes]
-    changes = [*mesh.changes, *incomplete, *found]
-    return refined, build_report(scheme, options.levels, [result], unused, changes)
+    if made.report is None:
+        raise UnrefinableError("no face has three different vertices")
+    parents = made.parents
+    if parents is not None:
+        rows = np.concatenate([primitive.rows for primitive in made.primitives])
+        shape = (parents.shape[0], len(mesh.vertices))
+        parents = replace(parents, columns=rows[parents.columns], shape=shape)
+    kept = [part.faces[keep] for part, keep in zip(parts, made.kept, strict=True)]
+    return Refined(
+        mesh=joined(mesh, parts, made.kept, made.refined, options.levels, parents),
+        corners=mesh.faces[np.concatenate(kept)].reshape(-1),
+        primitives=len(made.refined),
+        degenerate=made.degenerate,
+        copies=made.copies,
+        report=made.report,
+        bends=made.bends,
+        # There is no document for a pointer to point into.
+        changes=[*incomplete, *(replace(change, pointer="") for change in made.changes)],
+    )
 
 
 def faces_after(mesh: MeshFile, levels: int) -> int:
@@ -110,4 +126,5 @@ def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit
     each += BYTES_FOR_NORMALS * (options.normals not in ("auto", "keep"))
+    each += compression.BYTES_PER_FACE[options.compress]
     check_memory(faces * each, limits)

@@ -23,15 +23,14 @@ def read_stl(data: bytes) -> MeshFile:
     """Read an STL: its facets in order, whatever it says of their number or of its end.
 
     Raises:
-        UnreadableError: a file that ends within a facet, or holds none.
+        UnreadableError: a file that ends within a facet.
     """
+    changes: tuple[Change, ...] = ()
     if is_text(data):
-        points, sizes, changes = _of_text(plain_text(data))
+        points, sizes = _of_text(plain_text(data))
     else:
         points, changes = _of_binary(data)
         sizes = np.full(len(points) // 3, 3)
-    if not len(sizes):
-        raise UnreadableError("the STL file has no facets")
     return MeshFile(points, offsets_of(sizes), np.arange(len(points)), changes=changes)
 
 
@@ -75,9 +74,7 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
     return facets["corners"].reshape(-1, 3).astype(np.float64), changes
 
 
-def _of_text(
-    data: bytes,
-) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F"], tuple[Change, ...]]:
+def _of_text(data: bytes) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F"]]:
     """Read the vertices of each loop, on whatever lines they stand; all else is passed over."""
     text = cut_text(data, "STL")
     lengths = text.ends - text.begins
@@ -92,10 +89,7 @@ def _of_text(
     sizes = np.diff(np.searchsorted(vertex, ends), prepend=0)
     if sizes.sum() < len(vertex):
         raise UnreadableError("the STL file ends within a facet")
-    few = int((sizes < 3).sum())
-    kept = np.repeat(sizes >= 3, sizes)
-    changes = (Change("", "facets of fewer than three vertices dropped", few),) if few else ()
-    return points[kept], sizes[sizes >= 3], changes
+    return points, sizes
 
 
 def write_stl(mesh: MeshFile) -> bytes:

@@ -6,15 +6,16 @@ Every corner stays a corner of a triangle, those on a straight side too: a neigh
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pns_common.mesh import fans
 from pns_common.rows import cross, dot, norm
 
 from ..report import Change
-from .mesh_file import Layer, MeshFile, offsets_of
+from .mesh_file import MeshFile, offsets_of
 
 # Polygons that are cut together.
 BLOCK = 2**14
@@ -37,35 +38,14 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     polygon = np.concatenate([cut.polygon for cut in cuts])
     order = np.argsort(polygon, kind="stable")
     polygon = polygon[order]
-    flat = np.concatenate([cut.places for cut in cuts])[order].reshape(-1)
+    places = np.concatenate([cut.places for cut in cuts])[order]
     crossed = sum(cut.crossed for cut in cuts)
     told = {
         "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
         "polygons without an area or that cross themselves cut around one corner": crossed,
     }
-    return replace(
-        mesh,
-        changes=(
-            *mesh.changes,
-            *(Change("", what, count) for what, count in told.items() if count),
-        ),
-        offsets=np.arange(0, len(flat) + 1, 3),
-        corners=mesh.corners[flat],
-        layers={name: Layer(kept.values, kept.rows[flat]) for name, kept in mesh.layers.items()},
-        face_values={name: values[polygon] for name, values in mesh.face_values.items()},
-        labels={
-            kind: replace(label, of_face=label.of_face[polygon])
-            for kind, label in mesh.labels.items()
-        },
-    )
-
-
-def fan(mesh: MeshFile) -> Int[np.ndarray, "T 3"]:
-    """Return the vertices of triangles around the first corner of each polygon."""
-    pieces = mesh.sizes - 2
-    first = np.repeat(mesh.offsets[:-1], pieces)
-    step = 1 + np.arange(len(first)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    return mesh.corners[np.stack([first, first + step, first + step + 1], axis=1)]
+    changes = [Change("", what, count) for what, count in told.items() if count]
+    return mesh.cut(places, polygon).with_changes(changes)
 
 
 def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
@@ -106,29 +86,26 @@ def cut_polygons(
     """Cut polygons of three corners or more into triangles."""
     sizes = np.diff(offsets)
     pieces = sizes - 2
-    polygon = np.repeat(np.arange(len(sizes)), pieces)
-    first = offsets[:-1][polygon]
-    step = np.arange(len(polygon)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    places = np.stack([first, first + step + 1, first + step + 2], axis=1)
+    starts = np.cumsum(pieces) - pieces
+    places, polygon = fans(offsets)
     # Relative to a corner of its own: far from the origin products lose the polygon.
     points = vertices[corners]
     local = points - points[np.repeat(offsets[:-1], sizes)]
     normals = _newell(local, offsets)
     folded = _folded(local, places, normals[polygon])
     # A quad that is no fan from its first corner may be one from its second.
-    wrong = np.logical_or.reduceat(folded, np.cumsum(pieces) - pieces)
+    wrong = np.logical_or.reduceat(folded, starts)
     quads = np.flatnonzero(wrong & (sizes == 4))
     other = offsets[quads][:, None, None] + np.array([[1, 2, 3], [1, 3, 0]])
     better = ~_folded(local, other.reshape(-1, 3), np.repeat(normals[quads], 2, axis=0))
     better = better.reshape(-1, 2).all(axis=1)
-    begin = (np.cumsum(pieces) - pieces)[quads[better]]
+    begin = starts[quads[better]]
     places[begin[:, None] + np.arange(2)] = other[better]
     flat = ~normals.any(axis=1)
     crossed = int((~better).sum() + (wrong & flat)[sizes != 4].sum())
     wrong[quads], wrong[flat] = False, False
     keep = np.ones(len(places), dtype=bool)
     made: list[tuple[int, Int[np.ndarray, "t 3"]]] = []
-    starts = np.cumsum(pieces) - pieces
     # One by one: such polygons are few, and each is cut on its own.
     for face in np.flatnonzero(wrong).tolist():
         share = slice(offsets[face], offsets[face + 1])

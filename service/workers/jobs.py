@@ -183,7 +183,7 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from ..meshfiles import to_gltf  # noqa: F401
+    from ..meshfiles import convert  # noqa: F401
     from ..warming import warm_up as compile_kernels
 
     compile_kernels(log.info)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from service.meshfiles.example import part
+from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import MeshFile, of_triangles
-from service.meshfiles.triangles_glb import triangles_glb
 
 
 def a_part(number: int) -> MeshFile:

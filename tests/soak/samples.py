@@ -13,7 +13,7 @@ from service.bodies import uploads
 from service.gltf.read.container import read_glb
 from service.meshfiles.convert import converted
 from service.meshfiles.formats import write
-from service.meshfiles.triangles_glb import triangles_glb
+from service.meshfiles.glb import triangles_glb
 from service.options import Limits, Options
 from tests.soak.bodies import a_part, small_body
 

@@ -25,18 +25,16 @@ WELL_SHAPED = 1e-2
 def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Certificate]:
     """Certify T2 with the network in double precision, and again as the scheme runs.
 
-    Symmetric schemes keep mirrors too, and faces turned over: that without sharpness, which may
-    depend on which side is out. Slivers and nearly folded edges are left out: rounding is amplified
-    beyond any tolerance there, and a fallback frame does not turn with the mesh.
+    Schemes that correct once keep mirrors too, and faces turned over. Slivers and nearly folded
+    edges are left out: rounding is amplified beyond any tolerance there, and a fallback frame does
+    not turn with the mesh.
     """
-    rows = [_certify(subject, subject.exact, bodies, seed, "double precision", 0.0)]
+    rows = [_certify(subject, subject.exact, bodies, seed, "double precision")]
     if subject.is_single_precision:
-        rows.append(_certify(subject, subject.scheme, bodies, seed, "as it runs", SINGLE))
+        rows.append(_certify(subject, subject.scheme, bodies, seed, "as it runs", single=SINGLE))
     if subject.learned_once is not None:
-        rows += [
-            _certify(subject, subject.exact, bodies, seed, how, 0.0, mirror)
-            for how, mirror in (("mirrors", -1.0), ("turning over", 1.0))
-        ]
+        for how, mirror in (("mirrors", -1), ("turning over", 1)):
+            rows.append(_certify(subject, subject.exact, bodies, seed, how, mirror, -1))
     return rows
 
 
@@ -46,18 +44,16 @@ def _certify(
     bodies: Sequence[Body],
     seed: int,
     how: str,
-    single: float,
-    mirror: float | None = None,
+    mirror: int = 1,
+    order: int = 1,
+    *,
+    single: float = 0.0,
 ) -> Certificate:
     rng = np.random.default_rng(seed)
     measured, left_out = [], 0
     for body in bodies:
         turn, shift = random_motion(rng)
-        if mirror is None:
-            apart, kept = discrepancy(scheme, body.mesh, turn, shift)
-        else:
-            turn = turn * [mirror, 1, 1]
-            apart, kept = discrepancy(scheme, body.mesh, turn, shift, turned_over=True)
+        apart, kept = discrepancy(scheme, body.mesh, turn * [mirror, 1, 1], shift, order)
         reach = subject.base.plain(body.mesh.vertices, body.mesh.polygons).reach
         # In units of what rounding allows, so that one number serves every mesh.
         share = apart / (EXACT + single * subject.budget * reach**2) * (single or EXACT)
@@ -73,13 +69,16 @@ def discrepancy(
     mesh: Mesh,
     turn: Float[np.ndarray, "3 3"],
     shift: Float[np.ndarray, "3"],
-    *,
-    turned_over: bool = False,
+    order: int = 1,
 ) -> tuple[Float[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of."""
-    faces = [face[::-1] if turned_over else face for face in mesh.polygons]
+    """Return ‖S(gM) − g S(M)‖ at each new vertex, and which vertices the theorem speaks of.
+
+    ``order`` is −1 for faces turned over.
+    """
+    faces = [face[::order] for face in mesh.polygons]
     moved = Mesh(mesh.vertices @ turn.T + shift, faces)
-    creases: Creases = None if turned_over else "auto"
+    # Inside out, what was convex is concave, and may be less sharp.
+    creases: Creases = "auto" if order * np.linalg.det(turn) > 0 else None
     still, after = (step(scheme, each, creases).positions for each in (mesh, moved))
     # The same edges, which turned faces number in another order.
     here, there = (np.lexsort(each.topology().edges.T) for each in (mesh, moved))

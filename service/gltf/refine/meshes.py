@@ -64,7 +64,8 @@ class MeshOutcome:
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
         bends: bent edges, and the sharp ones among them.
-        parents: rows of the file's positions that each refined vertex is made of, if asked for.
+        parents: what each refined vertex is made of, if asked for: rows of the primitives, one
+            primitive after the other.
     """
 
     index: int
@@ -98,11 +99,12 @@ def refined_meshes(
     scheme: Scheme,
     options: Options,
     course: Course,
-    parts: frozenset[int] | None = None,
+    *,
+    traced: bool = False,
 ) -> Iterator[MeshOutcome]:
     """Refine meshes of an upload; each is yielded inside the part of the course for its writing.
 
-    `parts`, if given, are the primitives to refine, in place of those that the options name.
+    `traced` asks for the parents of vertices.
 
     Raises:
         ServiceError: a mesh is invalid, or cannot be refined.
@@ -110,13 +112,13 @@ def refined_meshes(
     """
     shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
-    chosen = None if parts is not None else chosen_primitives(upload, options)
-    if parts is not None:
-        chosen = {(plan.mesh, n): n in parts for plan in plans for n in plan.primitives}
+    chosen = chosen_primitives(upload, options)
     for window in _windows(plans, options.levels):
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):
-            yield from _window(upload, window, scheme, options, course, shares, chosen)
+            yield from _window(
+                upload, window, scheme, options, course, shares, chosen, traced=traced
+            )
         done += count
 
 
@@ -166,12 +168,14 @@ def _window(
     course: Course,
     shares: StageShares,
     chosen: dict[tuple[int, int], bool] | None,
+    *,
+    traced: bool,
 ) -> Iterator[MeshOutcome]:
     with course.stage("read", 0.0, shares.weld):
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
     # Rows of a union are numbered anew, and its faces are refined alike.
-    alike = chosen is None and not scheme.base.polygons
+    alike = chosen is None and not traced and not scheme.base.polygons
     if len(window) > 1 and options.weld == "position" and alike:
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
@@ -184,7 +188,15 @@ def _window(
             if scheme.base.polygons:
                 found = [find_polygons(p, options.polygons) for p in read[place]]
             outcomes[place] = refine_alone(
-                plan, read[place], scheme, options, course, shares, chosen=own, found=found
+                plan,
+                read[place],
+                scheme,
+                options,
+                course,
+                shares,
+                traced=traced,
+                chosen=own,
+                found=found,
             )
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
@@ -298,12 +310,11 @@ def refine_alone(
         report=None if made is None else made.reports[0],
         changes=changes,
         bends=NO_BENDS if made is None else count_bends(control.surface, creases)[0],
-        parents=None if made is None or made.parents is None else _in_file(made.parents, control),
+        parents=None if made is None or made.parents is None else _of_rows(made.parents, control),
     )
 
 
-def _in_file(parents: SubdivisionMatrix, control: ControlMesh) -> SubdivisionMatrix:
-    """Return parents by their numbers in the file, of which the first of each weld counts."""
-    rows = np.concatenate([primitive.rows for primitive in control.primitives])
-    columns = rows[control.vertex_rows()][parents.columns]
-    return replace(parents, columns=columns)
+def _of_rows(parents: SubdivisionMatrix, control: ControlMesh) -> SubdivisionMatrix:
+    """Return parents by their rows in the primitives, of which the first of each weld counts."""
+    shape = (parents.shape[0], len(control.weld.vertex_of))
+    return replace(parents, columns=control.vertex_rows()[parents.columns], shape=shape)

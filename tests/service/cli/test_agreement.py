@@ -16,6 +16,7 @@ from fastapi.testclient import TestClient
 from service.bodies.media import FORMATS, KINDS
 from service.http.app import create_app
 from service.meshfiles import formats
+from service.meshfiles.glb import as_gltf_json, triangles_glb
 from service.meshfiles.mesh_file import (
     GROUP,
     MATERIAL,
@@ -26,7 +27,6 @@ from service.meshfiles.mesh_file import (
     MeshFile,
     of_triangles,
 )
-from service.meshfiles.triangles_glb import as_gltf_json, triangles_glb
 from service.options import Limits, Options
 from service.settings import Settings
 from tests.support.gltf.shapes import box

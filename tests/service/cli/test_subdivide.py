@@ -14,7 +14,7 @@ import trimesh
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
 from service.meshfiles.example import part, part_glb
-from service.meshfiles.triangles_glb import triangles_glb
+from service.meshfiles.glb import triangles_glb
 from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box

@@ -21,7 +21,7 @@ from service.meshfiles import formats
 from service.meshfiles.convert import converted
 from service.meshfiles.example import part as example_part
 from service.meshfiles.example import part_glb
-from service.meshfiles.triangles_glb import as_gltf_json
+from service.meshfiles.glb import as_gltf_json
 from service.options import Limits, Options
 from service.settings import Settings
 from service.workers.jobs import hold_model

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from service.bodies.sibling_files import ALONE
 from service.errors import UnrefinableError
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
-from service.meshfiles.convert import Jobs, Written, convert, converted
+from service.meshfiles.convert import Written, converted
 from service.meshfiles.flatten import flatten
 from service.meshfiles.mesh_file import COLOUR, MATERIAL, MeshFile
 from service.options import Limits, Options
@@ -306,19 +305,3 @@ def test_one_material_is_refined_and_its_neighbours_meet_it(target: str, levels:
             assert (~label.named(name)).sum() < (12 - own) * 4**levels
     with pytest.raises(UnrefinableError, match="m0, m1"):
         refined(data, "obj", target, material="m2")
-
-
-@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl"])
-def test_a_map_makes_the_refined_positions_of_those_of_the_file(
-    target: str, tmp_path: Path
-) -> None:
-    from scipy.sparse import load_npz
-
-    data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
-    (tmp_path / "in.obj").write_bytes(data)
-    for material in (None, "m1"):
-        jobs = Jobs([tmp_path / "in.obj"], tmp_path / f"out.{target}", map=tmp_path / "map.npz")
-        assert not [*convert(jobs, Options(scheme="loop", material=material), None, Limits())]
-        made = formats.read((tmp_path / f"out.{target}").read_bytes(), target)
-        again = load_npz(tmp_path / "map.npz") @ formats.read(data, "obj").vertices
-        np.testing.assert_allclose(again, made.vertices, atol=1e-6)

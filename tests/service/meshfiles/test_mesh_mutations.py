@@ -13,8 +13,8 @@ from pns_common.schemes import loop
 from service.errors import ServiceError
 from service.meshfiles import formats
 from service.meshfiles.convert import converted
+from service.meshfiles.formats import read_within
 from service.meshfiles.refine_mesh_file import refine_mesh_file
-from service.meshfiles.to_gltf import read_within
 from service.options import Limits, Options
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)

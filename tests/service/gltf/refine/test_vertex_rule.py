@@ -9,9 +9,9 @@ from pns_common import Mesh, load_model, loop, pns, refine
 from service.errors import LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
+from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
-from service.meshfiles.triangles_glb import triangles_glb
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf import files

@@ -67,9 +67,9 @@ def test_targets_are_shared_with_the_rest():
 def test_they_are_refined_once_and_each_is_told_of(monkeypatch):
     refine, refined_first = subdivide.refined_meshes, []
 
-    def watched(upload, plans, *rest):
+    def watched(upload, plans, *rest, **asked):
         refined_first.extend(plan.mesh for plan in plans)
-        return refine(upload, plans, *rest)
+        return refine(upload, plans, *rest, **asked)
 
     monkeypatch.setattr(subdivide, "refined_meshes", watched)
     faces = np.concatenate([octahedron()["indices"].reshape(-1), [0, 0, 1]])
