@@ -452,4 +452,3 @@ class _Rows:
         if (by < 1).any():
             self.displacement[:] *= by[:, None]
             self.ratio[:] *= by
-
