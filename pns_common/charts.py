@@ -3,7 +3,7 @@
 A chart is a piece of the surface on which the values are continuous: corners are one point where
 their vertex and their values are one. Inside a chart the base scheme's masks are used, as for the
 vertices. On its border values stay where they are and edges get their midpoints, so that both sides
-of a seam keep meeting. Creases of the surface are creases of the charts too.
+of a seam keep meeting. Creases and corners of the surface are those of the charts too.
 """
 
 from __future__ import annotations
@@ -54,6 +54,10 @@ def refine_corners(
         edges = surface.corner_edges[chart.half_edges[:, 0]]
         inside = np.where(surface.edge_class == EdgeClass.IRREGULAR, 0.0, surface.sharpness)
         chart = chart.with_sharpness(inside[edges])
+        if len(surface.vertex_sharpness):
+            vertex_of = np.zeros(chart.vertex_count, dtype=np.int64)
+            vertex_of[chart.corners] = surface.corners
+            chart = chart.with_vertex_sharpness(surface.vertex_sharpness[vertex_of])
         border = (chart.edge_class == EdgeClass.BOUNDARY) | (
             chart.edge_class == EdgeClass.IRREGULAR
         )

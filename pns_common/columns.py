@@ -45,11 +45,9 @@ def level_topologies(
     corners, offsets = as_polygons(faces, vertex_count)
     blocks = blocks or Blocks()
     mesh = build_topology((corners, offsets), vertex_count, blocks)
-    topologies = [mesh.with_border(creases.border)]
-    if not (topologies[0].triangles or base.polygons):
+    if not (mesh.triangles or base.polygons):
         raise MeshError("polygons, expected triangles", element="faces")
-    if creases.named is not None and creases.sharp_at(0):
-        topologies[0] = creases.applied_by_name(topologies[0])
+    topologies = [creases.applied_by_name(mesh)]
     for depth in range(1, levels):
         topologies.append(base.split(topologies[-1], blocks, inherit=creases.sharp_at(depth)))
     return topologies[:levels]

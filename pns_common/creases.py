@@ -1,4 +1,4 @@
-"""Edges that stay sharp: named by the caller, or found by their angle or by a network."""
+"""Edges and vertices that stay sharp: named, or edges found by their angle or by a network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pns_common.kernels import measures
 from pns_common.normals import measure_faces
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import MOSTLY_SHARP, Topology
+from pns_common.topology import MOSTLY_SHARP, Topology, check_vertices
 
 HALF_TURN = 180
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
@@ -23,7 +23,7 @@ BORDERS = ("smooth", "corners", "fixed")
 
 @dataclass(frozen=True, eq=False)
 class Creases:
-    """Edges of a control mesh that are kept sharp.
+    """Edges and vertices of a control mesh that are kept sharp.
 
     Attributes:
         named: (N, 2) pairs of vertices; None for none.
@@ -33,12 +33,17 @@ class Creases:
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
             1998); None: at all. Edges that are sharp at the last level count as sharp for good in
             limits.
+        vertices: (M,) vertices that are kept as corners; None for none.
+        vertex_sharpness: (M,) at how many levels these are corners, 0 … infinity: s at level 0,
+            s − 1 at level 1, and so on, OpenSubdiv's numbers. What is less than a level is the
+            corner weight κ there: (1 − κ) the rule without + κ p. None: at as many as the edges.
         border: what boundaries do. "smooth": they become curves. "corners": these end at vertices
             of one face alone. "fixed": they stay as they are.
 
     Raises:
-        ParameterError: pairs that are no pairs of whole numbers, sharpness that is not one number
-            from 0 to 1 a pair, an angle outside 0 … 180, levels below 1, or another border.
+        ParameterError: pairs or vertices that are no whole numbers, sharpness that is not one
+            number from 0 to 1 a pair, or from 0 on a vertex, an angle outside 0 … 180, levels
+            below 1, or another border.
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
@@ -46,13 +51,22 @@ class Creases:
     angle: float | None = None
     learned: bool = False
     levels: int | None = None
+    vertices: Integer[np.ndarray, " M"] | None = None
+    vertex_sharpness: Float[np.ndarray, " M"] | None = None
     border: str = "smooth"
 
     def __post_init__(self) -> None:
         if self.named is not None:
             object.__setattr__(self, "named", as_pairs(self.named))
         if self.sharpness is not None:
-            _check_sharpness(self.sharpness, 0 if self.named is None else len(self.named))
+            expected = "a number from 0 to 1 for each named edge"
+            _check_numbers("sharpness", self.sharpness, self.named, 1.0, expected)
+        if self.vertices is not None:
+            object.__setattr__(self, "vertices", as_vertices(self.vertices))
+        if self.vertex_sharpness is not None:
+            expected = "a number ≥ 0 for each vertex"
+            given = self.vertex_sharpness, self.vertices
+            _check_numbers("vertex_sharpness", *given, np.inf, expected)
         angle, levels = self.angle, self.levels
         if angle is not None and not (is_number(angle) and 0 < angle < HALF_TURN):
             raise ParameterError("angle", angle, expected="degrees between 0 and 180")
@@ -95,7 +109,7 @@ class Creases:
         normals: Float[np.ndarray, "F 3"] | None = None,
         blocks: Blocks | None = None,
     ) -> Topology:
-        """Return the topology with this border, and the edges named or found by their angle.
+        """Return the topology with what is named, and the edges found by their angle.
 
         Args:
             points, topology: the mesh.
@@ -103,19 +117,28 @@ class Creases:
             blocks: how the work is shared.
 
         Raises:
-            ParameterError: a named pair is no edge of the mesh.
+            ParameterError: a named pair is no edge of the mesh, or a vertex is not there.
         """
         topology = self.applied_by_name(topology)
-        if self.angle is not None:
-            topology = topology.with_creases(self.found(points, topology, normals, blocks))
-        return topology.with_border(self.border)
+        if self.angle is None:
+            return topology
+        return topology.with_creases(self.found(points, topology, normals, blocks))
 
     def applied_by_name(self, topology: Topology) -> Topology:
-        """Return the topology with the edges that are named.
+        """Return the topology with this border, and the edges and vertices that are named.
 
         Raises:
-            ParameterError: a named pair is no edge of the mesh.
+            ParameterError: a named pair is no edge of the mesh, or a vertex is not there.
         """
+        topology = topology.with_border(self.border)
+        if self.vertices is not None and len(self.vertices):
+            check_vertices("vertices", self.vertices, topology.vertex_count)
+            sharpness = np.zeros(topology.vertex_count)
+            given = self.vertex_sharpness
+            if given is None:
+                given = np.inf if self.levels is None else float(self.levels)
+            np.maximum.at(sharpness, self.vertices, given)
+            topology = topology.with_vertex_sharpness(sharpness)
         if self.named is None or len(self.named) == 0:
             return topology
         rows = topology.rows_of(self.named)
@@ -206,15 +229,26 @@ def as_pairs(creases: Any) -> Integer[np.ndarray, "N 2"]:
     return pairs.astype(np.int64)
 
 
-def _check_sharpness(given: Any, count: int) -> None:
-    """Check that there is a number from 0 to 1 for each named edge. Raises ParameterError."""
+def as_vertices(given: Any) -> Integer[np.ndarray, " M"]:
+    """Return a copy of numbers of vertices. Raises ParameterError: they are something else."""
     values = np.asarray(given)
-    expected = "a number from 0 to 1 for each named edge"
+    whole = values.dtype.kind in "iu" or values.size == 0
+    if np.ma.is_masked(given) or values.ndim != 1 or not whole:
+        expected = "(M,) whole numbers of vertices"
+        raise ParameterError("vertices", f"{values.dtype} {values.shape}", expected=expected)
+    return values.astype(np.int64)
+
+
+def _check_numbers(
+    name: str, given: Any, of: np.ndarray | None, largest: float, expected: str
+) -> None:
+    """Raise ParameterError unless there is a number from 0 to the largest for each row."""
+    values, count = np.asarray(given), 0 if of is None else len(of)
     if values.shape != (count,) or values.dtype.kind not in "fiu":
-        raise ParameterError("sharpness", f"{values.dtype} {values.shape}", expected=expected)
-    wrong = np.flatnonzero(~((values >= 0) & (values <= 1)))
+        raise ParameterError(name, f"{values.dtype} {values.shape}", expected=expected)
+    wrong = np.flatnonzero(~((values >= 0) & (values <= largest)))
     if len(wrong):
-        raise ParameterError(f"sharpness[{wrong[0]}]", values[wrong[0]], expected=expected)
+        raise ParameterError(f"{name}[{wrong[0]}]", values[wrong[0]], expected=expected)
 
 
 def _is_pair(row: Any) -> bool:

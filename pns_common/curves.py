@@ -6,9 +6,9 @@ p + (a + b − 2 p) / 6. Pushing p the other way, across the curve, undoes that:
     d_p = −γ_p (w₂ − w₃) (u − (u · t) t) / 3     u = (a + b) / 2 − p, t the direction from a to b
 
 with a, b the ends of the two sharpest edges at p, w₂ and w₃ the weights of its second and third
-sharpest, γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning angle at p: 0 where the curve is
-straight, and 0 at corners of a right angle or more. Nothing here reads the surface beside the
-curve, so two meshes that share a boundary and R move it alike.
+sharpest (``topology.SharpVertices``), γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning
+angle at p: 0 where the curve is straight, and 0 at corners of a right angle or more. Nothing here
+reads the surface beside the curve, so two meshes that share a boundary and R move it alike.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Curves:
     """The curves of a mesh: its edges of sharpness above 0 that are not irregular.
 
     Attributes:
-        movable: (V,) vertices with w₂ > w₃, on no irregular edge, not pinned.
+        movable: (V,) vertices with w₂ > w₃, on no irregular edge.
         rows: their numbers.
         sides: (N, 2) the two neighbours of each along the curve.
         a, b: (N, 3) from each to these.
@@ -72,7 +72,6 @@ def find_curves(
     irregular = kinds == connectivity.IRREGULAR
     movable = share > 0
     movable[mesh.edges[irregular].reshape(-1)] = False
-    movable[mesh.pinned] = False
     rows = np.flatnonzero(movable)
     sides = sharp.neighbours[rows]
     a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))
@@ -83,7 +82,7 @@ def find_curves(
     along = points[ends[:, 1]] - points[ends[:, 0]]
     on_boundary = kinds == connectivity.BOUNDARY
     if on_boundary.any():
-        alone = sharp.weights[:, 2] == 0
+        alone = sharp.weights[:, 2] == mesh.corner_weights
         of_boundary = np.bincount(mesh.edges[on_boundary].reshape(-1), minlength=count)
         shared[:count] = movable & alone & (of_boundary == TWO)
         shared[count : count + edge_count] = on_boundary

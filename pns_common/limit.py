@@ -45,8 +45,8 @@ def limit_shift(
     blocks: Blocks | None = None,
     base: BaseScheme = LOOP,
 ) -> float:
-    """Return how far creases move the limit of a vertex, at most; 0 without creases."""
-    if len(topology.crease_edges) == 0 and len(topology.soft) == 0:
+    """Return how far creases and corners move the limit of a vertex, at most; 0 without any."""
+    if not (len(topology.crease_edges) or len(topology.soft) or len(topology.vertex_sharpness)):
         return 0.0
     smooth = limit_positions(points, topology.without_creases(), blocks, base)
     moved = limit_positions(points, topology, blocks, base) - smooth

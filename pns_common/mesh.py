@@ -179,10 +179,20 @@ class Mesh:
 
     @classmethod
     def of_refined(
-        cls, vertices: Float[np.ndarray, "V 3"], faces: Integer[np.ndarray, "F N"]
+        cls,
+        vertices: Float[np.ndarray, "V 3"],
+        faces: Integer[np.ndarray, "F N"] | Integer[np.ndarray, " H"],
+        offsets: Integer[np.ndarray, " F1"] | None = None,
     ) -> Mesh:
-        """Make a mesh of arrays that a refinement made and checked: neither copied nor read."""
-        return _kept(vertices, faces.reshape(-1), None, faces.shape[1])
+        """Make a mesh of arrays that a refinement made and checked: neither copied nor read.
+
+        Faces are their corners where ``offsets`` say where those of each begin.
+        """
+        if offsets is None:
+            return _kept(vertices, faces.reshape(-1), None, faces.shape[1])
+        degrees = np.diff(offsets)
+        degree = int(degrees[0]) if (degrees == degrees[0]).all() else None
+        return _kept(vertices, faces, offsets, degree)
 
 
 def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:

@@ -132,7 +132,7 @@ class Inputs:
         gate: γ.
         bound: ρ.
         reach: τ ℓ.
-        weight: 1, less at soft edges and at vertices on soft curves.
+        weight: 1, less at soft edges, at vertices on soft curves and at corners.
         degenerate: where there is no frame.
     """
 
@@ -239,7 +239,7 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     read = pull, rings.fields, rings.valence, level.ringed, weight, rule.prior_strength
     level.blocks.run(len(made), lambda begin, end: measures.normal_pushes(*read, begin, end, made))
     sharp = level.topology.sharpest
-    if sharp is not None and len(level.topology.soft):
+    if sharp is not None:
         made *= 1 - sharp.weights[:, 1:2]
     return made
 
@@ -284,7 +284,6 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
     measures.vertex_features(rings.means, rings.fields, rows, 0, count, features)
     measures.ring_basis(rings.means, rings.fields, rows, 0, count, basis)
     square = rings.means[rows, measures.SQUARE]
-    soft = sharp is not None and len(level.topology.soft) > 0
     return Inputs(
         rows,
         features,
@@ -292,7 +291,7 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
         gate=np.tanh(rule.vertex_gate_sharpness * rings.means[rows, measures.JUMP]),
         bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * np.sqrt(square),
-        weight=1 - sharp.weights[rows, 1] if sharp is not None and soft else np.ones(count),
+        weight=1 - sharp.weights[rows, 1] if sharp is not None else np.ones(count),
         degenerate=np.zeros(count, dtype=bool),
     )
 

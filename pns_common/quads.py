@@ -36,10 +36,10 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
     faces, edge_count = len(parent.corners), len(parent.edges)
     vertex_count = parent.vertex_count + edge_count + parent.face_count
     offsets = np.arange(0, len(corners) + 1, QUAD, dtype=np.int32)
+    worn = parent.worn_vertices(vertex_count)
     if not parent.plain:
-        made = replace(
-            build_topology((corners, offsets), vertex_count, blocks), pinned=parent.pinned
-        )
+        made = build_topology((corners, offsets), vertex_count, blocks)
+        made = replace(made, vertex_sharpness=worn)
         return inheriting(made, parent) if inherit else made
     source = parent if inherit else parent.without_creases()
     halves, arrays = np.empty((edge_count, 2), np.uint32), (parent.corners, parent.offsets)
@@ -70,6 +70,6 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
         half_edges,
         edge_class,
         soft,
+        worn,
         plain=True,
-        pinned=parent.pinned,
     )

@@ -138,7 +138,7 @@ class Refinement:
 
     def _repr_html_(self) -> str:
         counts = {"scheme": self.scheme.name, "levels": len(self.steps)}
-        sizes = {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)}
+        sizes = {"vertices": len(self.mesh.vertices), "faces": self.mesh.face_count}
         return as_html(self.mesh, counts | sizes)
 
 
@@ -174,8 +174,9 @@ def refine(
             1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
             as sharp as the sharpness network finds it; none without one. None: no edge.
         border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
-        faces: refine these alone, by number or as a mask. Neighbours are cut to meet them, and
-            other vertices stay. The report is that of refining all.
+        faces: refine these alone, by number or as a mask. Triangles beside them are cut to meet
+            them; over Catmull–Clark any face beside them gets their new vertices as corners. Other
+            vertices stay. The report is that of refining all.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
             any thread, one at a time; an exception that it raises ends the refinement.
@@ -199,8 +200,6 @@ def refine(
     told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
     chosen = None if faces is None else chosen_faces(faces, mesh.face_count)
-    if chosen is not None and scheme.base.polygons:
-        raise ParameterError("faces", scheme.name, expected="a scheme of triangles")
 
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level, steps = with_sharp_edges(level, kept, scheme), list[Step]()
@@ -228,13 +227,15 @@ def refine(
     ratio, gate = (nothing, nothing) if added is None else (added.ratio, added.gate)
     selected = None
     if chosen is not None:
-        selected = select(chosen, [step.level.topology for step in steps], refined, len(points))
-        refined, rows = selected.faces, selected.vertices
+        selected = select(chosen, steps[0].level.topology, refined, len(points), count)
+        rows = selected.vertices
         points, ratio, gate = points[rows], ratio[rows], gate[rows]
         points[: len(mesh.vertices)][selected.still] = mesh.vertices[selected.still]
         normals = None if normals is None else normals[rows]
     return Refinement(
-        mesh=Mesh.of_refined(points, refined),
+        mesh=Mesh.of_refined(points, refined)
+        if selected is None
+        else Mesh.of_refined(points, selected.corners, selected.offsets),
         ratio=ratio,
         gate=gate,
         normals=normals,
@@ -329,14 +330,17 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
 
 
 def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None:
-    """Return the longest way from the smooth rules to the new vertices of creases; None without."""
-    mesh, rows = level.topology, level.topology.crease_edges
-    soft = np.flatnonzero(mesh.soft)
-    if len(rows) == 0 and len(soft) == 0:
+    """Return the longest way from the smooth rules to new vertices of creases and to corners.
+
+    None without any.
+    """
+    mesh = level.topology
+    rows = np.concatenate([mesh.crease_edges, np.flatnonzero(mesh.soft)])
+    corners = np.flatnonzero(mesh.vertex_sharpness)
+    if len(rows) == 0 and len(corners) == 0:
         return None
-    rows = np.concatenate([rows, soft])
     smooth = level.base.place(level.points, mesh.without_creases(), level.blocks.quiet())
-    vertices = np.unique(mesh.edges[rows])
+    vertices = np.unique(np.concatenate([mesh.edges[rows].reshape(-1), corners]))
     at = np.concatenate([vertices.astype(np.int64), mesh.vertex_count + rows])
     return longest(placed[at] - smooth[at])
 

@@ -70,11 +70,16 @@ def walked_arrays(topology: Topology) -> tuple[np.ndarray, ...]:
 
 
 def sector_kinds(topology: Topology, around: Sectors) -> Integer[np.ndarray, " S"]:
-    """Return the kind of each sector: closed, or by the sharp edges at its vertex."""
+    """Return the kind of each sector: closed, or by the sharp edges at its vertex.
+
+    A corner inside a smooth surface is the tip of a cone: its sector stays closed, and its normal
+    is that of the ring.
+    """
     kind = np.full(len(around.first), CLOSED, dtype=np.int64)
     if around.opened:
-        sharp = topology.sharp_count.copy()
-        sharp[topology.pinned] = CORNER
+        sharp = topology.sharp_count
+        if len(topology.vertex_sharpness):
+            sharp = np.where((topology.corner_weights == 1) & (sharp == CURVE), CORNER, sharp)
         kind[: around.opened] = np.minimum(sharp[around.vertex[: around.opened]], CORNER)
     return kind
 

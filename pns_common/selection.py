@@ -7,7 +7,6 @@ refined, and vertices of no chosen face stay where they were.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -17,7 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Integer
 
 from pns_common.errors import ParameterError
-from pns_common.topology import Topology
+from pns_common.rows import marked
+from pns_common.topology import Topology, following
 
 SIDES = 3
 
@@ -27,12 +27,16 @@ class Selected:
     """A refined mesh without what refines faces that were not chosen.
 
     Attributes:
-        faces: (G, 3) its faces, by `vertices`.
+        places: (H,) which corner of all refined faces each of its corners is.
+        offsets: (G + 1,) where the corners of each of its faces begin.
+        corners: (H,) its corners, by `vertices`.
         vertices: (W,) refined vertices that are kept, ascending: all old ones, and some new.
         still: (V,) old vertices of no chosen face, which stay where they were.
     """
 
-    faces: Integer[np.ndarray, "G 3"]
+    places: Integer[np.ndarray, " H"]
+    offsets: Integer[np.ndarray, " G1"]
+    corners: Integer[np.ndarray, " H"]
     vertices: Integer[np.ndarray, " W"]
     still: Bool[np.ndarray, " V"]
 
@@ -59,50 +63,84 @@ def chosen_faces(given: Any, count: int) -> Bool[np.ndarray, " F"]:
 
 def select(
     chosen: Bool[np.ndarray, " F"],
-    topologies: Sequence[Topology],
-    refined: Integer[np.ndarray, "C 3"],
+    mesh: Topology,
+    refined: Integer[np.ndarray, "C N"],
     count: int,
+    levels: int,
 ) -> Selected:
-    """Leave out what refines faces that are not chosen; `refined` are faces of `count` vertices."""
-    mesh, segments = topologies[0], 2 ** len(topologies)
-    split = np.zeros(len(mesh.edges), dtype=bool)
-    split[mesh.face_edges[chosen]] = True
-    rest = np.flatnonzero(~chosen)
-    sides = split[mesh.face_edges[rest]]
-    points = np.full((len(rest), SIDES * segments), -1, dtype=np.int64)
-    points[:, :SIDES] = mesh.faces[rest]
-    for side in range(SIDES):
-        some = np.flatnonzero(sides[:, side])
-        ends = mesh.faces[rest[some]][:, [side, (side + 1) % SIDES]].astype(np.int64)
-        begin = SIDES + side * (segments - 1)
-        points[some, begin : begin + segments - 1] = _along(ends, topologies)[:, 1:-1]
-    blocks = [refined.reshape(len(chosen), -1, SIDES)[chosen].reshape(-1, SIDES)]
-    owners = [np.repeat(np.flatnonzero(chosen), 4 ** len(topologies))]
-    for kind, triangles in enumerate(transitions(segments)):
-        own = np.flatnonzero(sides @ [1, 2, 4] == kind)
-        blocks.append(points[own][:, triangles].reshape(-1, SIDES))
-        owners.append(np.repeat(rest[own], len(triangles)))
-    faces = np.concatenate(blocks)[np.argsort(np.concatenate(owners), kind="stable")]
-    kept = np.zeros(count, dtype=bool)
+    """Leave out what refines faces that are not chosen.
+
+    Triangles beside chosen ones are cut. Beside quads any face takes the new vertices as corners.
+
+    Args:
+        chosen: faces of the control mesh.
+        mesh: the control mesh.
+        refined: all refined faces, triangles or quads, of ``count`` vertices.
+        count, levels: how many vertices these have, and how often faces were split.
+    """
+    degree, each, every = refined.shape[1], int(4**levels), np.arange(len(mesh.corners))
+    picked = chosen[mesh.face_of(every)]
+    own, rest = np.flatnonzero(picked), np.flatnonzero(~picked)
+    split = marked(mesh.corner_edges[own], len(mesh.edges))[mesh.corner_edges[rest]]
+    along = _along(rest, following(mesh.offsets)[rest], levels, degree)
+    if degree == SIDES:
+        places, owner = _cut(along.reshape(-1, SIDES, 2**levels), split.reshape(-1, SIDES))
+        owner = rest[SIDES * owner]
+    else:
+        points = np.ones(along.shape, dtype=bool)
+        points[~split, 1:] = False
+        places, owner = along[points], np.repeat(rest, points.sum(axis=1))
+    counts = np.where(picked, each, np.bincount(owner, minlength=len(picked)))
+    made = np.empty(counts.sum(), dtype=np.int64)
+    inside = np.repeat(picked, counts)
+    made[inside] = np.add.outer(each * own, np.arange(each)).reshape(-1)
+    made[~inside] = places
+    offsets = np.arange(0, len(made) + 1, degree)
+    if degree != SIDES:
+        sides = np.add.reduceat(counts, mesh.offsets[:-1])
+        faces = np.where(chosen, sides // degree, 1)
+        offsets = np.append(0, np.cumsum(np.repeat(sides // faces, faces)))
+    corners = refined.reshape(-1)[made]
+    kept = marked(corners, count)
     kept[: mesh.vertex_count] = True
-    kept[faces] = True
-    still = np.ones(mesh.vertex_count, dtype=bool)
-    still[mesh.faces[chosen]] = False
-    return Selected((np.cumsum(kept) - 1)[faces], np.flatnonzero(kept), still)
+    still = ~marked(mesh.corners[own], mesh.vertex_count)
+    return Selected(made, offsets, (np.cumsum(kept) - 1)[corners], np.flatnonzero(kept), still)
 
 
 def _along(
-    ends: Integer[np.ndarray, "N 2"], topologies: Sequence[Topology]
+    corners: Integer[np.ndarray, " N"],
+    followed: Integer[np.ndarray, " N"],
+    levels: int,
+    degree: int,
 ) -> Integer[np.ndarray, "N P"]:
-    """Return the refined vertices along edges, both ends among them."""
-    points = ends
-    for mesh in topologies:
-        pairs = np.stack([points[:, :-1], points[:, 1:]], axis=2)
-        middles = mesh.vertex_count + mesh.rows_of(pairs.reshape(-1, 2)).reshape(pairs.shape[:2])
-        finer = np.empty((len(points), 2 * points.shape[1] - 1), dtype=np.int64)
-        finer[:, ::2], finer[:, 1::2] = points, middles
-        points = finer
-    return points
+    """Return the corners of refined faces along the edges that leave corners, from each on.
+
+    The child of a corner begins there: its first side is the first half of the edge that leaves
+    the corner, and its last side the second half of the edge that enters it.
+    """
+    own, followed = corners[:, None], followed[:, None]
+    for _ in range(levels):
+        if degree == SIDES:
+            own, followed = (4 * (at // SIDES) + at % SIDES for at in (own, followed))
+        halves = np.stack([degree * own, degree * followed + degree - 1], axis=2)
+        own = halves.reshape(len(own), 2 * own.shape[1])
+        followed = own - own % degree + (own + 1) % degree
+    return own
+
+
+def _cut(
+    along: Integer[np.ndarray, "N 3 P"], split: Bool[np.ndarray, "N 3"]
+) -> tuple[Integer[np.ndarray, " M"], Integer[np.ndarray, " M"]]:
+    """Return the corners of the triangles that N triangles are cut into, and of which each is."""
+    inner = along[:, :, 1:].reshape(len(along), SIDES * (along.shape[2] - 1))
+    points = np.concatenate([along[:, :, 0], inner], axis=1)
+    owners, places = list[np.ndarray](), list[np.ndarray]()
+    for kind, triangles in enumerate(transitions(along.shape[2])):
+        own = np.flatnonzero(split @ [1, 2, 4] == kind)
+        places.append(points[own][:, triangles.reshape(-1)].reshape(-1))
+        owners.append(np.repeat(own, triangles.size))
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return np.concatenate(places)[order], np.concatenate(owners)[order]
 
 
 @lru_cache(maxsize=8)

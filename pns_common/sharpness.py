@@ -13,7 +13,7 @@ marks change no features, so the edges beside them are found as if nothing were 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -198,7 +198,8 @@ def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
     topology = with_sharp_edges(level, creases, scheme).topology
     found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
     sharpness = topology.sharpness[found] if len(topology.soft) else None
-    return Creases(topology.edges[found].astype(np.int64), sharpness, levels=creases.levels)
+    edges = topology.edges[found].astype(np.int64)
+    return replace(creases, named=edges, sharpness=sharpness, angle=None, learned=False)
 
 
 def sharp_edges(

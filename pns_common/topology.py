@@ -6,7 +6,7 @@ appearance over the faces, (a, b), (b, c), … from each face's first corner on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
@@ -25,7 +25,6 @@ NO_WEIGHTS = np.zeros(0)
 # Edges of a sharpness above this count as sharp where there is only yes and no.
 MOSTLY_SHARP = 1 / 2
 NO_FACES = np.zeros(0, dtype=np.uint32)
-NO_VERTICES = np.zeros(0, dtype=np.int64)
 
 
 class EdgeClass(IntEnum):
@@ -43,7 +42,8 @@ class SharpVertices:
 
     Attributes:
         rows: vertices on two or more edges of sharpness above 0.
-        weights: (V, 3) the three largest sharpnesses at each vertex, descending.
+        weights: (V, 3) the three largest sharpnesses w at each vertex, descending, each as
+            κ + (1 − κ) w: a vertex of corner weight κ is so far like one on three sharp edges.
         neighbours: (V, 2) the far ends of the two sharpest edges.
     """
 
@@ -70,8 +70,9 @@ class Topology:
         edge_class: (E,) EdgeClass values.
         soft: (E,) sharpness w in [0, 1] of interior edges; (0,) where it is 0 at all of them. Other
             edges have w = 1.
+        vertex_sharpness: (V,) at how many more levels each vertex is a corner, infinity for good,
+            its last part in part; (0,) where none is.
         plain: no face names a vertex twice, and no two triangles have the same vertices.
-        pinned: vertices on boundaries that stay where they are.
     """
 
     vertex_count: int
@@ -83,8 +84,8 @@ class Topology:
     half_edges: Integer[np.ndarray, "E 2"]
     edge_class: Integer[np.ndarray, " E"]
     soft: Float[np.ndarray, " S"]
+    vertex_sharpness: Float[np.ndarray, " K"]
     plain: bool
-    pinned: Integer[np.ndarray, " P"] = field(default_factory=lambda: NO_VERTICES)
 
     @property
     def face_count(self) -> int:
@@ -154,10 +155,17 @@ class Topology:
         creases = self.edge_class == kernels.CREASE
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
+    @property
+    def corner_weights(self) -> Float[np.ndarray, " V"]:
+        """Corner weight κ of every vertex."""
+        if len(self.vertex_sharpness):
+            return np.minimum(self.vertex_sharpness, 1.0)
+        return np.zeros(self.vertex_count)
+
     @cached_property
     def sharpest(self) -> SharpVertices | None:
-        """The vertices on sharp and soft edges; None where all edges are interior and smooth."""
-        if len(self.sharp_edges) == 0 and len(self.soft) == 0:
+        """The vertices on sharp and soft edges, and corners; None where there is none of all."""
+        if not (len(self.sharp_edges) or len(self.soft) or len(self.vertex_sharpness)):
             return None
         edges = self.sharp_edges
         if len(self.soft):
@@ -165,7 +173,9 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        weights[self.pinned] = 1.0
+        if len(self.vertex_sharpness):
+            corner = self.corner_weights[:, None]
+            weights = corner + (1 - corner) * weights
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
     @cached_property
@@ -230,16 +240,31 @@ class Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
         if rule == "smooth":
             return self
-        pinned = np.zeros(self.vertex_count, dtype=bool)
-        pinned[self.edges[self.edge_class == kernels.BOUNDARY]] = True
+        sharpness = np.zeros(self.vertex_count)
+        sharpness[self.edges[self.edge_class == kernels.BOUNDARY]] = np.inf
         if rule == "corners":
-            pinned &= np.bincount(self.corners, minlength=self.vertex_count) == 1
-        return replace(self, pinned=np.flatnonzero(pinned))
+            sharpness[np.bincount(self.corners, minlength=self.vertex_count) != 1] = 0.0
+        return self.with_vertex_sharpness(sharpness)
+
+    def with_vertex_sharpness(self, sharpness: Float[np.ndarray, " V"]) -> Topology:
+        """Return a copy whose vertices are so sharp, where they are less."""
+        if len(self.vertex_sharpness):
+            sharpness = np.maximum(sharpness, self.vertex_sharpness)
+        return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
+
+    def worn_vertices(self, count: int) -> Float[np.ndarray, " K"]:
+        """Return ``vertex_sharpness`` a level later, where there are ``count`` vertices."""
+        if not (self.vertex_sharpness > 1).any():
+            return NO_WEIGHTS
+        worn = np.zeros(count)
+        worn[: self.vertex_count] = np.maximum(self.vertex_sharpness - 1, 0.0)
+        return worn
 
     def without_creases(self) -> Topology:
-        """Return a copy without creases and soft edges."""
+        """Return a copy without creases, soft edges and corners."""
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
-        return replace(self, edge_class=classes.astype(np.int8), soft=NO_WEIGHTS)
+        kept = {"soft": NO_WEIGHTS, "vertex_sharpness": NO_WEIGHTS}
+        return replace(self, edge_class=classes.astype(np.int8), **kept)
 
     def rows_of(
         self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
@@ -249,11 +274,7 @@ class Topology:
         Raises:
             ParameterError: a pair is no edge; ``name`` is the argument's.
         """
-        outside = np.flatnonzero(((pairs < 0) | (pairs >= self.vertex_count)).any(axis=1))
-        if len(outside):
-            row = int(outside[0])
-            expected = f"vertices 0 … {self.vertex_count - 1}"
-            raise ParameterError(f"{name}[{row}]", pairs[row].tolist(), expected=expected)
+        check_vertices(name, pairs, self.vertex_count)
         named = np.zeros(self.vertex_count, dtype=bool)
         named[pairs.reshape(-1)] = True
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
@@ -324,6 +345,7 @@ def build_topology(
         half_edges,
         edge_class,
         NO_WEIGHTS,
+        NO_WEIGHTS,
         (plain or not triangles) and not repeating,
     )
 
@@ -340,8 +362,9 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         inherit: whether the halves of creases and soft edges inherit their sharpness.
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
+    worn = parent.worn_vertices(vertex_count)
     if not parent.plain:
-        made = replace(build_topology(faces, vertex_count, blocks), pinned=parent.pinned)
+        made = replace(build_topology(faces, vertex_count, blocks), vertex_sharpness=worn)
         return inheriting(made, parent) if inherit else made
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
@@ -374,8 +397,8 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         half_edges,
         edge_class,
         child_soft,
+        worn,
         plain=True,
-        pinned=parent.pinned,
     )
 
 
@@ -404,6 +427,21 @@ def halves_of(parent: Topology, rows: Integer[np.ndarray, " N"]) -> Integer[np.n
     """Return the halves of edges, as vertex pairs of the split mesh."""
     ends, middle = parent.edges[rows].astype(np.int64), parent.vertex_count + rows.astype(np.int64)
     return np.stack([ends, np.stack([middle, middle], axis=1)], axis=-1).reshape(-1, 2)
+
+
+def following(offsets: Integer[np.ndarray, " F1"]) -> Integer[np.ndarray, " H"]:
+    """Return the next corner of the same face, of each corner; ``offsets`` as of a topology."""
+    made = np.arange(1, offsets[-1] + 1, dtype=np.int64)
+    made[offsets[1:] - 1] = offsets[:-1]
+    return made
+
+
+def check_vertices(name: str, given: Integer[np.ndarray, " N *K"], count: int) -> None:
+    """Raise ParameterError where an argument names a vertex that is not there."""
+    outside = np.argwhere((given < 0) | (given >= count))
+    if len(outside):
+        row, expected = int(outside[0, 0]), f"vertices 0 … {count - 1}"
+        raise ParameterError(f"{name}[{row}]", given[row].tolist(), expected=expected)
 
 
 Numbered = tuple[
@@ -438,9 +476,7 @@ def _sort_edges(
     corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return what ``_number_edges`` does, by sorting: for vertices of thousands of edges."""
-    following = np.arange(1, len(corners) + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    pairs = np.stack([corners, corners[following]], axis=1)
+    pairs = np.stack([corners, corners[following(offsets)]], axis=1)
     keys = _keys(pairs, vertex_count)
     _, first, group, count = np.unique(
         keys, return_index=True, return_inverse=True, return_counts=True

@@ -114,9 +114,6 @@ class Options:
         return None if self.reference_length == "auto" else self.reference_length
 
 
-# What a parameter is where it is not given.
-DEFAULTS = Options()
-
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
     "levels": f"depth, 1 to {MAX_LEVELS}: each level makes four faces of one",
@@ -140,7 +137,8 @@ DESCRIPTIONS = {
     "fixed: as they are",
     "polygons": "triangles of a glTF. auto: joined to the quads that most of them are halves of, "
     "or to polygons by FB_ngon_encoding, for Catmull-Clark. off: refined as they are",
-    "material": "refine only the faces of this material; their neighbours are cut to meet them",
+    "material": "refine only the faces of this material; triangles beside them are cut, and "
+    "polygons get more corners",
     "group": "refine only this group or object of an OBJ, or mesh of a glTF, by its name or that "
     "of a node that shows it",
     "compress": "how a glTF's geometry is written. meshopt: exact. draco: smaller; positions, "

@@ -14,14 +14,14 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
-from pns_common.creases import Creases, as_pairs
+from pns_common.creases import Creases
 from pns_common.errors import ParameterError
 from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks
 from pns_common.refinement import Refinement, refine
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import Scheme
-from pns_common.topology import Topology
+from pns_common.topology import Topology, check_vertices
 
 # The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
 CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])
@@ -72,9 +72,7 @@ def refine_carried(
     if weld == "position":
         joined, first = join_by_position(given.vertices)
     creases = options.get("creases", "auto")
-    if isinstance(creases, Creases) and creases.named is not None:
-        options["creases"] = replace(creases, named=_renamed(creases.named, joined))
-    elif creases is not None and not isinstance(creases, str | Creases):
+    if creases is not None and not isinstance(creases, str):
         options["creases"] = _renamed(creases, joined)
     surface_faces = joined[given.corners], given.offsets
     refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
@@ -107,19 +105,20 @@ def refine_carried(
     return CarriedMesh(positions, faces, points, corners, cells), refinement
 
 
-def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Integer[np.ndarray, "N 2"]:
+def _renamed(creases: Any, joined: Integer[np.ndarray, " V"]) -> Creases:
     """Return creases by the joined vertices.
 
     Raises:
-        ParameterError: they are not pairs of the mesh's vertices.
+        ParameterError: they are not pairs of the mesh's vertices, or name others as corners.
     """
-    pairs, count = as_pairs(creases), len(joined)
-    outside = np.flatnonzero(((pairs < 0) | (pairs >= count)).any(axis=1))
-    if len(outside):
-        row = int(outside[0])
-        expected = f"vertices 0 … {count - 1}"
-        raise ParameterError(f"creases[{row}]", pairs[row].tolist(), expected=expected)
-    return joined[pairs]
+    made, count = creases if isinstance(creases, Creases) else Creases(creases), len(joined)
+    if made.vertices is not None:
+        check_vertices("vertices", made.vertices, count)
+        made = replace(made, vertices=joined[made.vertices])
+    if made.named is None:
+        return made
+    check_vertices("creases", made.named, count)
+    return replace(made, named=joined[made.named])
 
 
 def join_by_position(

@@ -114,7 +114,8 @@ def subdivide(
             return cast(AnyMesh, made)
         # A tuple with names takes its values one by one, but for this.
         make: Any = getattr(type(mesh), "_make", type(mesh))
-        return make((np.array(made.vertices), np.array(made.faces)))
+        alike = len({*np.diff(made.offsets).tolist()}) == 1
+        return make((np.array(made.vertices), np.array(made.faces) if alike else made.polygons))
     adapter = _adapter(mesh)
     if triangulate and adapter.triangulated is not None:
         mesh = adapter.triangulated(mesh)

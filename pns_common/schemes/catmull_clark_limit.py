@@ -73,7 +73,8 @@ def limit_positions(
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
     mesh, count, sharp = topology, topology.vertex_count, topology.sharpest
-    placed = place(points, replace(mesh, soft=NO_WEIGHTS), blocks)
+    smooth = replace(mesh, soft=NO_WEIGHTS, vertex_sharpness=NO_WEIGHTS)
+    placed = place(points, smooth, blocks)
     read = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges, mesh.corner_reach
     sums, edge_count = np.empty((count, WIDTH + 1)), len(mesh.edges)
     blocks.owners(count).run(

@@ -14,7 +14,7 @@ from pns_common.creases import NO_CREASES, Creases
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
 from pns_common.schemes import LOOP, BaseScheme
-from pns_common.topology import EdgeClass, Topology
+from pns_common.topology import EdgeClass, Topology, following
 
 from ..options import Options
 from .barycentric_grid import at_quad_points
@@ -104,9 +104,7 @@ def _in_charts(
     named = creases.named
     if named is None or len(named) == 0:
         return NO_CREASES
-    follow = np.arange(1, len(corners) + 1)
-    follow[offsets[1:] - 1] = offsets[:-1]
-    sides = np.stack([corners, corners[follow]], axis=1)
+    sides = np.stack([corners, corners[following(offsets)]], axis=1)
     count = int(max(vertex.max(), named.max())) + 1
     ends, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (vertex[sides], named))
     kept = np.isin(ends, wanted)

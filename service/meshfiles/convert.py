@@ -267,14 +267,8 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
     """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
     if options.scheme == "catmull-clark" or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
-        wants = [name for name in ("material", "group") if getattr(options, name)]
-        if scheme is not None and not wants:
-            return mesh, scheme
-        if options.scheme == "catmull-clark":
-            raise InvalidParameter(wants[0], f"{wants[0]} is for triangles: choose scheme=loop")
         if scheme is not None:
-            told = f"polygons cut into triangles, which {wants[0]} needs"
-            mesh = mesh.with_changes([Change("", told, 1)])
+            return mesh, scheme
     return triangulated(mesh), make_scheme(options, model)
 
 

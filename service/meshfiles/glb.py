@@ -30,6 +30,7 @@ from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
 from .parts import Part, parts_of
+from .triangulate import triangulated
 
 _SHAPES: tuple[Literal["SCALAR", "VEC2", "VEC3", "VEC4"], ...] = ("SCALAR", "VEC2", "VEC3", "VEC4")
 # Which corners of a quad its two triangles have, by the corner that both begin with.
@@ -46,6 +47,8 @@ def as_glb(
 ) -> tuple[bytes, dict[str, Any]]:
     """Write refined triangles or quads; return also the report, with what is lost.
 
+    Where other polygons are among quads, all are cut into triangles.
+
     Materials are read from the libraries that came with the file, or lie beside it.
 
     Raises:
@@ -54,8 +57,8 @@ def as_glb(
     changes = rounding_changes(mesh)
     mesh, lost = _with_colours_at_corners(mesh)
     changes += lost
-    quads = bool(mesh.sizes[0] == 4)
-    parts, incomplete = parts_of(_as_triangles(mesh) if quads else mesh)
+    quads = bool((mesh.sizes == 4).all())
+    parts, incomplete = parts_of(_as_triangles(mesh) if quads else triangulated(mesh))
     opened, labels = Opened(siblings), mesh.labels.get(MATERIAL)
     made = materials_of(() if labels is None else labels.names, mesh.libraries, opened)
     changes += incomplete + [

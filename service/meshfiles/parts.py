@@ -62,7 +62,7 @@ def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None
     """
     if not options.selects:
         return None
-    chosen = np.ones(len(mesh.faces), dtype=bool)
+    chosen = np.ones(len(mesh.sizes), dtype=bool)
     wanted = ((options.material, (MATERIAL,)), (options.group, (GROUP, OBJECT)))
     names: list[set[str]] = []
     for name, kinds in wanted:

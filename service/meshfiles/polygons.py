@@ -1,7 +1,8 @@
 """Refine polygons as polygons, by Catmull–Clark: quads come out, and what corners and faces carry.
 
 Values at corners follow the split of the faces that they are at: those of one vertex with one value
-stay one, so seams stay seams.
+stay one, so seams stay seams. Where some faces are refined alone, all are, and of the others only
+the corners are kept that `pns_common.selection` keeps.
 """
 
 from __future__ import annotations
@@ -9,17 +10,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from pns_common.columns import level_topologies
 from pns_common.creases import Creases
-from pns_common.mesh import Mesh
-from pns_common.normals import angle_weighted_normals, smooth_fans
+from pns_common.mesh import Mesh, fans
+from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine
 from pns_common.report import Report
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
+from pns_common.topology import EdgeClass, following
 
 from ..advice import Bends, count_bends
 from ..course import Course
@@ -36,6 +38,8 @@ from ..meshes.weld_tolerance import weld_within
 from ..options import Options
 from ..report import Change
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
+from .parts import chosen_of
+from .triangulate import cut_blocks
 
 # All four triangles of a quad: its normal does not depend on a diagonal.
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -97,6 +101,11 @@ def refine_polygons(
     with course.stage("weld", 0.0, 0.1):
         control = _control(mesh, options)
         creases = _creases(control, mesh, options, scheme)
+    picked = chosen_of(mesh, options)
+    if picked is not None:
+        picked = picked[control.faces]
+        if not picked.any():
+            raise UnrefinableError("no chosen face has three different vertices")
     with course.stage("refine", 0.1, 0.7):
         made = refine(
             control.mesh,
@@ -105,6 +114,7 @@ def refine_polygons(
             options.reference_length,
             limit=options.limit,
             creases=creases,
+            faces=picked,
             progress=lambda done, total: course.reach(done / total),
         )
     with course.stage("attributes", 0.7, 1.0):
@@ -113,7 +123,7 @@ def refine_polygons(
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
         refined = replace(refined, parents=parents)
-    (misses,) = near_misses(control.mesh, [made.reference_length])
+    (misses,) = near_misses(control.mesh.vertices, made.topologies[0], [made.reference_length])
     told = {
         "vertices joined within weld_tolerance": control.near,
         "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
@@ -136,9 +146,7 @@ def _control(mesh: MeshFile, options: Options) -> _Control:
     """Weld vertices; drop corners that repeat the one before, and faces of fewer than three."""
     welded, near = _welded(mesh, options)
     corner = welded.faces.reshape(-1)
-    follow = np.arange(1, len(corner) + 1)
-    follow[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
-    differs = corner != corner[follow]
+    differs = corner != corner[following(mesh.offsets)]
     sizes = np.add.reduceat(differs, mesh.offsets[:-1], dtype=np.int64)
     faces = np.flatnonzero(sizes >= 3)
     if not len(faces):
@@ -181,9 +189,7 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
     row = distinct_rows(normals.values)[normals.rows[control.places]]
     row[normals.rows[control.places] < 0] = NONE
     there, back = topology.half_edges[topology.interior].T
-    offsets = control.mesh.offsets
-    follow = np.arange(1, len(row) + 1)
-    follow[offsets[1:] - 1] = offsets[:-1]
+    follow = following(control.mesh.offsets)
     hard = np.ones(len(edges), dtype=bool)
     for one, other in ((there, follow[back]), (follow[there], back)):
         hard &= (row[one] >= 0) & (row[other] >= 0) & (row[one] != row[other])
@@ -194,18 +200,28 @@ def _with_layers(
     mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
 ) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
-    corners = made.mesh.corners
+    corners, selected = made.mesh.corners, made.selected
     counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
     of_face = np.repeat(control.faces, counts)
     layers: dict[str, Layer] = {}
     for name, layer in mesh.layers.items():
         layers[name] = _refined(name, layer, control, creases, options)
+    still = np.zeros(0, dtype=np.int64)
+    if selected is not None:
+        of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
+        still = np.flatnonzero(np.isin(corners, np.flatnonzero(selected.still)))
+        source = control.places[selected.places[still] // 4**options.levels]
+        for name, layer in mesh.layers.items():
+            layers[name] = _kept(layers[name], selected.places, still, layer, source)
     if options.normals == "smooth":
         layers[NORMAL] = _smooth_normals(made)
     elif NORMAL in layers:
-        layers[NORMAL] = _normals(made.mesh.vertices, made.mesh.faces, layers[NORMAL].rows)
+        before = layers[NORMAL]
+        layers[NORMAL] = _with(_normals(made.mesh, before.rows), still, before, still)
     if made.normals is not None and options.normals == "limit":
         layers[NORMAL] = Layer(made.normals, corners)
+        if len(still):
+            layers[NORMAL] = _with(layers[NORMAL], still, _normals(made.mesh, corners), still)
     if options.diagnostics == "full":
         scalars = {RATIO: made.ratio, GATE: made.gate}
         layers |= {
@@ -221,6 +237,33 @@ def _with_layers(
         mesh.libraries,
         mesh.double,
     )
+
+
+def _kept(
+    layer: Layer,
+    places: Int[np.ndarray, " H"],
+    still: Int[np.ndarray, " N"],
+    before: Layer,
+    source: Int[np.ndarray, " N"],
+) -> Layer:
+    """Return a layer at `places`; corners that stay have the values of `before` at `source`."""
+    made = _with(Layer(layer.values, layer.rows[places]), still, before, source)
+    used = np.unique(made.rows[made.rows >= 0])
+    rows = np.where(made.rows >= 0, np.searchsorted(used, made.rows), NONE)
+    return Layer(made.values[used], rows)
+
+
+def _with(
+    layer: Layer, at: Int[np.ndarray, " N"], other: Layer, source: Int[np.ndarray, " N"]
+) -> Layer:
+    """Return a layer with the values at some corners that another one has at `source`."""
+    rows, theirs = layer.rows[at], other.rows[source]
+    both = (rows >= 0) & (theirs >= 0)
+    if not both.any():
+        return layer
+    values = np.array(layer.values)
+    values[rows[both]] = other.values[theirs[both]]
+    return Layer(values, layer.rows)
 
 
 def _refined(
@@ -250,27 +293,44 @@ def _refined(
     return Layer(column, corners)
 
 
-def _normals(
-    vertices: Float[np.ndarray, "V 3"],
-    quads: Int[np.ndarray, "F 4"],
-    groups: Int[np.ndarray, " C"],
-) -> Layer:
-    """Return the normals of groups of corners of quads; corners of no group have none."""
+def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
+    """Return the normals of groups of corners; corners of no group have none."""
     own = np.where(groups >= 0, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
     number, _ = number_by_first_appearance(own)
     count, blocks = int(number.max()) + 1, Blocks(available_threads())
-    groups_of = number.reshape(-1, 4)
-    normals = angle_weighted_normals(vertices, quads, groups_of, count, blocks, TRIANGLES)
+    if (np.diff(mesh.offsets) == 4).all():
+        rows, triangles = (mesh.corners.reshape(-1, 4), number.reshape(-1, 4)), TRIANGLES
+    else:
+        places, triangles = _covering(mesh), ONE_TRIANGLE
+        rows = mesh.corners[places], number[places]
+    normals = angle_weighted_normals(mesh.vertices, *rows, count, blocks, triangles)
     return Layer(safe_unit(normals), np.where(groups >= 0, number, NONE))
+
+
+def _covering(mesh: Mesh) -> Int[np.ndarray, "T 3"]:
+    """Return triangles that cover each face twice, by their corners: all four of a quad."""
+    starts, sizes = mesh.offsets[:-1], np.diff(mesh.offsets)
+    others = np.flatnonzero(sizes != 4)
+    offsets = offsets_of(sizes[others])
+    place = np.arange(offsets[-1]) + np.repeat(starts[others] - offsets[:-1], sizes[others])
+    rest = MeshFile(mesh.vertices, offsets, mesh.corners[place])
+    cuts = np.concatenate([cut.places for cut in cut_blocks(rest)])
+    quads = (starts[sizes == 4][:, None, None] + TRIANGLES).reshape(-1, 3)
+    return np.concatenate([quads, np.repeat(place[cuts], 2, axis=0)])
 
 
 def _smooth_normals(made: Refinement) -> Layer:
     """Return normals that are smooth but across the edges that are sharp at the last level."""
-    last, sharp = made.topologies[-1], None
+    mesh, last, sharp = made.mesh, made.topologies[-1], None
     if len(last.crease_edges):
         fine = CATMULL_CLARK.split(last, Blocks())
-        sharp = fine.edges[fine.crease_edges].astype(np.int64)
-    vertices, quads = made.mesh.vertices, made.mesh.faces
-    triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    fans = smooth_fans(triangles, len(vertices), sharp).reshape(-1, 6)
-    return _normals(vertices, quads, fans[:, [0, 1, 2, 5]].reshape(-1))
+        begins = fine.edge_class[fine.corner_edges] == EdgeClass.CREASE
+        begins = begins if made.selected is None else begins[made.selected.places]
+        ends = mesh.corners[following(mesh.offsets)]
+        sharp = np.stack([mesh.corners, ends], axis=1)[begins]
+    places, _ = fans(mesh.offsets)
+    made_fans = smooth_fans(mesh.corners[places], len(mesh.vertices), sharp)
+    groups = np.empty(len(mesh.corners), dtype=np.int64)
+    # Of two triangles at a corner the first counts.
+    groups[places[::-1]] = made_fans[::-1]
+    return _normals(mesh, groups)

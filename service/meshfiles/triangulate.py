@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh import fans
 from pns_common.rows import cross, dot, norm
+from pns_common.topology import following
 
 from ..report import Change
 from .mesh_file import MeshFile, offsets_of
@@ -32,9 +33,7 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     """Return the same surface as triangles, in the order of the polygons."""
     if (mesh.sizes == 3).all():
         return mesh
-    # Of coordinates near the largest numbers areas may be infinite: such polygons become fans.
-    with np.errstate(over="ignore", invalid="ignore"):
-        cuts = [*_cut_blocks(mesh)]
+    cuts = [*cut_blocks(mesh)]
     polygon = np.concatenate([cut.polygon for cut in cuts])
     order = np.argsort(polygon, kind="stable")
     polygon = polygon[order]
@@ -48,7 +47,7 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     return mesh.cut(places, polygon).with_changes(changes)
 
 
-def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
+def cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
     """Cut polygons some at a time: what that takes is many times what is left."""
     sizes = mesh.sizes
     whole = np.flatnonzero(sizes == 3)
@@ -59,7 +58,9 @@ def _cut_blocks(mesh: MeshFile) -> Iterator[Cut]:
         offsets = offsets_of(sizes[chosen])
         place = np.repeat(mesh.offsets[chosen] - offsets[:-1], sizes[chosen])
         place += np.arange(len(place))
-        cut = cut_polygons(mesh.vertices, offsets, mesh.corners[place])
+        # Of coordinates near the largest numbers areas may be infinite: such polygons become fans.
+        with np.errstate(over="ignore", invalid="ignore"):
+            cut = cut_polygons(mesh.vertices, offsets, mesh.corners[place])
         yield Cut(place[cut.places], chosen[cut.polygon], cut.crossed)
 
 
@@ -135,9 +136,7 @@ def _newell(
     local: Float[np.ndarray, "C 3"], offsets: Int[np.ndarray, " F1"]
 ) -> Float[np.ndarray, "F 3"]:
     """Return twice the area of each polygon along its normal, planar or not (Newell)."""
-    follow = np.arange(1, len(local) + 1)
-    follow[offsets[1:] - 1] = offsets[:-1]
-    return np.add.reduceat(cross(local, local[follow]), offsets[:-1], axis=0)
+    return np.add.reduceat(cross(local, local[following(offsets)]), offsets[:-1], axis=0)
 
 
 def _folded(
@@ -218,8 +217,8 @@ def _with_straight_corners(
     made: list[list[int]] = []
     for triangle in triangles.tolist():
         outline: list[int] = []
-        for corner, following in zip(triangle, [*triangle[1:], triangle[0]], strict=True):
-            there, back = between.pop((corner, following), []), between.pop((following, corner), [])
+        for corner, after in zip(triangle, [*triangle[1:], triangle[0]], strict=True):
+            there, back = between.pop((corner, after), []), between.pop((after, corner), [])
             outline += [corner, *there, *reversed(back)]
         made += _fan_without_flat(outline, points)
     return np.array(made)

@@ -9,7 +9,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 
-SOURCE = Path(__file__).resolve().parents[1] / "library" / "catmull_clark.cpp"
+SOURCE = Path(__file__).with_suffix(".cpp")
 
 
 @cache
@@ -18,7 +18,7 @@ def _driver():
     compiler = shutil.which("c++") or shutil.which("g++")
     if compiler is None:
         return None, "OpenSubdiv's driver: no C++ compiler"
-    program = Path(mkdtemp(prefix="opensubdiv-")) / "catmull_clark"
+    program = Path(mkdtemp(prefix="opensubdiv-")) / "driver"
     built = subprocess.run(
         [compiler, "-O1", "-std=c++14", str(SOURCE), "-o", str(program), "-losdCPU"],
         capture_output=True,
@@ -27,17 +27,31 @@ def _driver():
     return (program, "") if built.returncode == 0 else (None, "OpenSubdiv: no libosd-dev here")
 
 
-def catmull_clark(points, faces, levels, creases=()):
-    """Return (Q, 4) positions, limits and two limit tangents at the corners of refined quads."""
+def catmull_clark(points, faces, levels, creases=(), corners=()):
+    """Return (Q, 4) positions, limits and two limit tangents at the corners of refined quads.
+
+    ``corners`` are pairs: vertices, and at how many levels they are sharp, 10 and more for good.
+    """
+    return _refined(4, points, faces, levels, creases, corners)
+
+
+def loop(points, faces, levels, creases=(), corners=()):
+    """Return what ``catmull_clark`` does, (T, 3) for triangles by Loop's scheme."""
+    return _refined(3, points, faces, levels, creases, corners)
+
+
+def _refined(degree, points, faces, levels, creases, corners):
     program, reason = _driver()
     if program is None:
         pytest.skip(reason)
-    lines = [f"{len(points)} {len(faces)} {len(creases)} {levels}"]
+    counts = degree, len(points), len(faces), len(creases), len(corners), levels
+    lines = [" ".join(map(str, counts))]
     lines += [" ".join(f"{x:.17g}" for x in point) for point in points]
     lines += [" ".join(map(str, [len(face), *map(int, face)])) for face in faces]
     lines += [f"{a} {b}" for a, b in creases]
+    lines += [f"{v} {sharpness:.9g}" for v, sharpness in corners]
     ran = subprocess.run(
         [program], input="\n".join(lines), capture_output=True, text=True, check=True
     )
-    made = np.array(ran.stdout.split(), dtype=float).reshape(-1, 4, 4, 3)
+    made = np.array(ran.stdout.split(), dtype=float).reshape(-1, degree, 4, 3)
     return tuple(made[:, :, k] for k in range(4))

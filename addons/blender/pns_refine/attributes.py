@@ -44,6 +44,7 @@ STRUCTURE = {
     ".corner_vert",
     ".corner_edge",
     "crease_edge",
+    "crease_vert",
     "custom_normal",
     "pns_ratio",
     "pns_gate",
@@ -52,7 +53,7 @@ STRUCTURE = {
 # What is selected: of no use on other elements.
 PASSING = (".select_", ".vs.", ".es.", ".uv_select")
 # Weights of single vertices, which must not spread to those around them.
-OF_ONE_VERTEX = {"crease_vert", "bevel_weight_vert"}
+OF_ONE_VERTEX = {"bevel_weight_vert"}
 ROWS = 20_000
 
 

@@ -276,6 +276,7 @@ def _digest(mesh: bpy.types.Mesh, reading: Reading, live: PNS_PG_live) -> str:
         snapshot.polygon_corners,
         snapshot.edges,
         snapshot.crease_sharpness,
+        snapshot.vertex_sharpness,
         snapshot.groups,
         snapshot.offsets,
     ):

@@ -26,7 +26,6 @@ def losses(obj: bpy.types.Object, reading: Reading, refined: Refined) -> list[st
     return [
         *_of_faces(reading, refined),
         *_of_attributes(mesh, reading),
-        *_of_creases(mesh),
         *_of_normals(mesh),
         *_of_groups(reading),
         *_of_keys(mesh),
@@ -64,16 +63,6 @@ def _of_attributes(mesh: bpy.types.Mesh, reading: Reading) -> list[str]:
     if len(mesh.skin_vertices):
         said.append("Lost: radii of the Skin modifier")
     return said
-
-
-def _of_creases(mesh: bpy.types.Mesh) -> list[str]:
-    crease = mesh.attributes.get("crease_vert")
-    if crease is None:
-        return []
-    values = np.zeros(len(crease.data), np.float32)
-    crease.data.foreach_get("value", values)
-    count = int((values > 0).sum())
-    return [f"{count:,} vertex creases are kept, and do not sharpen"] if count else []
 
 
 def _of_normals(mesh: bpy.types.Mesh) -> list[str]:

@@ -73,7 +73,8 @@ def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
         polygons=polygons,
         polygon_corners=starts,
         edges=edges,
-        crease_sharpness=crease_sharpness_of(_creases(mesh)),
+        crease_sharpness=crease_sharpness_of(_creases(mesh, "crease_edge", len(mesh.edges))),
+        vertex_sharpness=crease_sharpness_of(_creases(mesh, "crease_vert", len(mesh.vertices))),
         groups=groups,
         offsets=offsets,
         layers=tuple(layers),
@@ -116,10 +117,10 @@ def _weights(mesh: bpy.types.Mesh) -> Generator[None, None, tuple[np.ndarray, in
     return weights, empty
 
 
-def _creases(mesh: bpy.types.Mesh) -> np.ndarray:
-    attribute = mesh.attributes.get("crease_edge")
+def _creases(mesh: bpy.types.Mesh, name: str, count: int) -> np.ndarray:
+    attribute = mesh.attributes.get(name)
     if attribute is None:
-        return np.zeros(len(mesh.edges))
+        return np.zeros(count)
     return _floats(attribute.data, "value", 1)[:, 0]
 
 

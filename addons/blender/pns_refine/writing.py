@@ -118,9 +118,13 @@ def _write_layers(mesh: bpy.types.Mesh, refined: Refined) -> Generator[None, Non
             except (RuntimeError, KeyError) as error:
                 lost.append(f"Attribute {layer.name}: {error}")
         yield
-    if (refined.crease_sharpness > 0).any():
-        crease = mesh.attributes.new("crease_edge", "FLOAT", "EDGE")
-        crease.data.foreach_set("value", _flat(crease_of(refined.crease_sharpness), np.float32))
+    creases = {"EDGE": refined.crease_sharpness, "POINT": refined.vertex_sharpness}
+    for (domain, sharpness), name in zip(
+        creases.items(), ("crease_edge", "crease_vert"), strict=True
+    ):
+        if (sharpness > 0).any():
+            crease = mesh.attributes.new(name, "FLOAT", domain)
+            crease.data.foreach_set("value", _flat(crease_of(sharpness), np.float32))
     for name, values in zip(SHOWN, (refined.ratio, refined.gate, refined.distance), strict=True):
         mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set(
             "value", _flat(values, np.float32)

@@ -23,7 +23,7 @@ from pns_common.mesh import Mesh
 from pns_common.parallel import Blocks
 from pns_common.rows import cross, distinct_rows, dot, norm, unit
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import Topology, build_topology
+from pns_common.topology import Topology, build_topology, following
 
 from ...meshes.barycentric_grid import at_quad_points
 from ...meshes.weld import canonical_zero
@@ -254,8 +254,7 @@ class _Rings:
         wrong[order[1:]] |= ordered[1:] == ordered[:-1]
         sizes = np.diff(self.offsets)
         wrong |= (sizes != sizes[leader])[polygon]
-        follow = np.arange(1, len(vertex) + 1)
-        follow[self.offsets[1:] - 1] = self.offsets[:-1]
+        follow = following(self.offsets)
         onward, back = follow[source] == source[follow], source == follow[source[follow]]
         turned = back[self.offsets[:-1]] & ~onward[self.offsets[:-1]]
         wrong |= ~np.where(turned[polygon], back, onward)

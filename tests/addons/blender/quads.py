@@ -56,6 +56,7 @@ def snapshot(
         polygon_corners=4 * np.arange(len(quads) + 1),
         edges=edges,
         crease_sharpness=np.broadcast_to(np.asarray(crease_sharpness, float), len(edges)).copy(),
+        vertex_sharpness=np.zeros(len(points)),
         groups=np.zeros((len(points), 0)),
         offsets=np.zeros((0, len(points), 3)),
         layers=layers,

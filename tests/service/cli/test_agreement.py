@@ -64,7 +64,7 @@ def mesh() -> MeshFile:
         NORMAL: Layer(normals, made.corners * 0 + (range_of(made) // 3)),
         UV: Layer(made.vertices[:, :2] / 2 + 0.5, made.corners),
     }
-    halves = np.arange(len(made.faces)) % 2
+    halves = np.arange(len(made.faces)) // 2 % 2  # pairs of triangles, which make quads
     labels = {MATERIAL: Labels(("a", "c"), halves), GROUP: Labels(("b", "d"), halves // 2)}
     return MeshFile(made.vertices, made.offsets, made.corners, layers, labels=labels)
 

@@ -22,19 +22,20 @@ def mapped(source: Path, target: str, **options: Any) -> tuple[bytes, Path]:
     """Refine a file; return the result, and the file of the map."""
     output, parents = source.parent / f"out.{target}", source.parent / "map.npz"
     asked = Options(**({"scheme": "loop", "levels": 2} | options))
-    model = None if asked.scheme == "loop" else "general"
+    model = "general" if asked.learns else None
     assert not [*convert(Jobs([source], output, map=parents), asked, model, Limits())]
     return output.read_bytes(), parents
 
 
 @pytest.mark.parametrize("target", ["obj", "ply", "off", "stl"])
 @pytest.mark.parametrize("material", [None, "m1"])
+@pytest.mark.parametrize("scheme", ["loop", "catmull-clark"])
 def test_a_map_of_one_matrix_makes_the_positions(
-    target: str, material: str | None, tmp_path: Path
+    target: str, material: str | None, scheme: str, tmp_path: Path
 ) -> None:
     data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
     (tmp_path / "in.obj").write_bytes(data)
-    made, parents = mapped(tmp_path / "in.obj", target, material=material)
+    made, parents = mapped(tmp_path / "in.obj", target, material=material, scheme=scheme)
     again = load_npz(parents) @ formats.read(data, "obj").vertices
     np.testing.assert_allclose(again, formats.read(made, target).vertices, atol=1e-6)
 

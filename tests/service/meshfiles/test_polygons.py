@@ -9,10 +9,11 @@ import pytest
 
 from pns_common import Mesh, load_model, refine
 from pns_common.schemes import catmull_clark
-from service.errors import InvalidParameter
+from service.errors import InvalidParameter, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.convert import Written, converted
-from service.meshfiles.mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, UV
+from service.meshfiles.flatten import flatten
+from service.meshfiles.mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, UV, MeshFile
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.shared import shared_path
@@ -29,6 +30,10 @@ def cube(behind: str = "") -> bytes:
         text += f"usemtl m{number % 2}\ng g{number // 3}\n"
         text += "f " + " ".join(f"{v + 1}/{k + 1}" for k, v in enumerate(quad)) + "\n"
     return text.encode()
+
+
+# The side at z = 1 is a group of its own.
+TOPPED = cube().replace(b"usemtl m1\ng g0", b"usemtl m1\ng top", 1)
 
 
 def made(data: bytes, kind: str, target: str, **options: Any) -> Written:
@@ -121,12 +126,110 @@ def test_each_scheme_takes_polygons_as_it_says() -> None:
     assert counts == {"auto": 24, "pns": 24, "loop": 48, "catmull-clark": 24}
     triangles = made(cube(), "obj", "obj", scheme="loop").content
     assert made(triangles, "obj", "obj", scheme="catmull-clark").faces == 3 * 48
-    with pytest.raises(InvalidParameter, match="material"):
-        made(cube(), "obj", "obj", scheme="catmull-clark", material="m0")
     glb = made(cube(), "obj", "glb").content
     assert made(glb, "glb", "glb", scheme="catmull-clark", polygons="auto").faces == 2 * 4 * 24
     with pytest.raises(InvalidParameter, match="catmull-clark"):
         made(glb, "glb", "glb", scheme="catmull-clark", material="m0")
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "glb"])
+@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("name", ["m1", "top"])
+def test_chosen_polygons_are_refined_and_their_neighbours_stay_polygons(
+    target: str, levels: int, name: str
+) -> None:
+    kind = MATERIAL if name == "m1" else GROUP
+    given = formats.read_polygons(TOPPED, "obj")
+    chosen, corners = given.labels[kind].named(name), given.corners.reshape(6, 4)
+    full = formats.read_polygons(made(TOPPED, "obj", "obj", levels=levels).content, "obj")
+    written = made(TOPPED, "obj", target, levels=levels, **{kind: name})
+    if target == "glb":
+        mesh, _ = flatten(written.content, "obj", Limits())
+    else:
+        mesh = formats.read_polygons(written.content, target)
+    assert written.report["scheme"] == "catmull-clark"
+    assert is_closed(mesh)
+    still = {CORNERS[v] for v in np.setdiff1d(np.arange(8), corners[chosen])}
+    assert {*CORNERS} & {*map(tuple, mesh.vertices.tolist())} == still
+    if target in ("stl", "glb"):
+        return
+    wanted: list[Any] = []
+    for face, own in enumerate(corners.tolist()):
+        if chosen[face]:
+            wanted += shown(full)[face * 4**levels : (face + 1) * 4**levels]
+        else:
+            beside = np.array([len({*own} & {*other}) == 2 for other in QUADS])
+            length = 4 + int((beside & chosen).sum()) * (2**levels - 1)
+            wanted.append([{CORNERS[v] for v in own} & still, *range(length - 1)])
+    if target == "off":  # it lists faces by their size
+        wanted.sort(key=len)
+    for ring, expected in zip(shown(mesh), wanted, strict=True):
+        assert len(ring) == len(expected)
+        assert ring == expected if isinstance(expected, tuple) else expected[0] <= {*ring}
+    if target == "obj":
+        assert (mesh.sizes[mesh.labels[kind].named(name)] == 4).all()
+        # A side's own coordinates: those of new corners lie evenly between its old ones.
+        uv = mesh.layers[UV]
+        for ring in np.split(uv.values[uv.rows], mesh.offsets[1:-1]):
+            steps = np.abs(np.diff(np.vstack([ring, ring[:1]]), axis=0)).sum(axis=1)
+            assert np.isin(steps.round(9), [2.0**-levels, 1]).all()
+        assert len(uv.values) == len({*uv.rows.tolist()})
+
+
+def rings(mesh: MeshFile) -> list[Any]:
+    return np.split(mesh.corners, mesh.offsets[1:-1])
+
+
+def shown(mesh: MeshFile) -> list[Any]:
+    """Return where the corners of each face are."""
+    return [tuple(map(tuple, mesh.vertices[ring].round(5).tolist())) for ring in rings(mesh)]
+
+
+def is_closed(mesh: MeshFile) -> bool:
+    """Tell whether each side, by positions, is there once in each direction."""
+    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    faces = [place.reshape(-1)[ring].tolist() for ring in rings(mesh)]
+    there = [side for face in faces for side in zip(face, face[1:] + face[:1], strict=True)]
+    return len({*there}) == len(there) and {*there} == {(b, a) for a, b in there}
+
+
+@pytest.mark.parametrize("normals", ["keep", "smooth", "limit"])
+def test_normals_beside_chosen_polygons_are_those_of_what_is_left(normals: str) -> None:
+    outward = np.array(CORNERS) / 3**0.5
+    text = "".join(f"vn {x} {y} {z}\n" for x, y, z in outward.tolist()) + TOPPED.decode()
+    for quad in QUADS:
+        plain = " ".join(f"{v + 1}/{k + 1}" for k, v in enumerate(quad))
+        text = text.replace(plain, " ".join(f"{v + 1}/{k + 1}/{v + 1}" for k, v in enumerate(quad)))
+    options: dict[str, Any] = {"normals": normals, "limit": normals == "limit"}
+    written = made(text.encode(), "obj", "obj", group="top", **options)
+    mesh = formats.read_polygons(written.content, "obj")
+    got = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows]
+    np.testing.assert_allclose(np.linalg.norm(got, axis=1), 1, atol=1e-6)
+    points = mesh.vertices[mesh.corners]
+    # They point away from the middle of a solid that is round, or was a cube.
+    assert (np.einsum("ij,ij->i", got, points) > 0.5 * np.linalg.norm(points, axis=1)).all()
+    at = (np.abs(points) == 1).all(axis=1)
+    assert at.sum() == 4 * 3
+    tolerance = 1e-6 if normals == "keep" else 0.3
+    np.testing.assert_allclose(got[at], points[at] / 3**0.5, atol=tolerance)
+
+
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "glb"])
+def test_choosing_all_polygons_is_refining_all(target: str) -> None:
+    data = cube("s 1\n").replace(b"m1", b"m0")
+    more: dict[str, Any] = {"uv": "smooth", "normals": "smooth", "crease": "angle:60"}
+    for options in ({}, more):
+        every = made(data, "obj", target, levels=2, **options)
+        chosen = made(data, "obj", target, levels=2, material="m0", **options)
+        assert chosen.content == every.content
+        assert chosen.report == every.report
+
+
+def test_a_choice_of_no_polygon_is_refused() -> None:
+    with pytest.raises(UnrefinableError, match="m0, m1"):
+        made(cube(), "obj", "obj", material="m2")
+    with pytest.raises(UnrefinableError, match="three different"):
+        made(cube() + b"usemtl thin\nf 1 2 2 1\n", "obj", "obj", material="thin")
 
 
 @pytest.mark.parametrize(

@@ -64,14 +64,16 @@ def compute(
     scheme = scheme_of(snapshot, choice, bar.look_up)
     base = scheme.base
     control = snapshot.control(whole=base.polygons)
-    mesh, border = control.mesh, choice.border
+    mesh = control.mesh
     lines = shown_creases(snapshot, control, scheme) if choice.crease_lines else NO_CREASES
     soft, lines = soft_and_hard(lines)
     pairs, crease_sharpness = all_creases(snapshot, control, choice.crease_angle, lines)
-    cage = mesh.topology().with_border(border), base, choice.levels
+    topology = mesh.topology().with_border(choice.border)
+    topology = topology.with_vertex_sharpness(snapshot.vertex_sharpness)
+    cage = topology, base, choice.levels
     steps = level_steps(*cage, pairs, crease_sharpness, soft)
     positions = refine_positions(
-        mesh, scheme, steps, border, limit=choice.limit, progress=bar.within("positions")
+        mesh, scheme, steps, limit=choice.limit, progress=bar.within("positions")
     )
     plain = steps
     if any(found.named is not None and len(found.named) for found in (soft, lines)):
@@ -99,11 +101,14 @@ def compute(
         bar.reach("corners", (number + 1) / len(snapshot.layers))
     edges = np.concatenate([steps.final.edges, snapshot.edges[loose]])
     old, count = len(snapshot.points), len(positions.points)
+    vertex_sharpness = np.zeros(count)
+    vertex_sharpness[:old] = np.maximum(snapshot.vertex_sharpness - choice.levels, 0.0)
     return Refined(
         points=positions.points,
         faces=faces,
         edges=edges,
         crease_sharpness=np.r_[_final_crease_sharpness(steps), snapshot.crease_sharpness[loose]],
+        vertex_sharpness=vertex_sharpness,
         groups=np.clip(columns[:, :group_count], 0, 1),
         offsets=moves.reshape(len(columns), len(offsets), 3).transpose(1, 0, 2),
         layers=hide_within(tuple(layers), faces, edges, own_edge < 0, old, count),
@@ -178,7 +183,7 @@ def _distance_from_base(
     """Return how far each vertex lies from where the base scheme alone would have it."""
     if choice.model is None:
         return np.zeros(len(positions.points))
-    asked = control.mesh, named_scheme(steps.base.name), steps, choice.border
+    asked = control.mesh, named_scheme(steps.base.name), steps
     plain = refine_positions(*asked, limit=choice.limit, progress=bar.within("base"))
     return np.linalg.norm(positions.points - plain.points, axis=1)
 
@@ -251,12 +256,13 @@ class _Carry:
         if layer.rule is Rule.BLEND:
             # Directions are stored roughly: what differs by less than that is no seam.
             same = np.round(values, 3) if layer.unit else None
-            creases = self.steps.steps[0].creases
+            creases, sharp = self.steps.steps[0].creases, self.snapshot.vertex_sharpness
             uv = layer.kind == "FLOAT2"
             smoothing = self.choice.uv_smooth if uv else Smoothing.PRESERVE_BOUNDARIES
             mesh, levels = self.control.mesh, self.choice.levels
             faces = mesh.corners, mesh.offsets
-            return refine_corners(values, faces, self.steps.base, levels, creases, same, smoothing)
+            asked = faces, self.steps.base, levels, creases, sharp, same, smoothing
+            return refine_corners(values, *asked)
         return vote_at_corners(values, self.steps.base, self.choice.levels)
 
 

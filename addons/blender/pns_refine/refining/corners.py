@@ -20,6 +20,7 @@ def refine_corners(
     base: BaseScheme,
     levels: int,
     creases: Int[np.ndarray, "N 2"],
+    vertex_sharpness: Float[np.ndarray, " V"],
     same: Float[np.ndarray, "C J"] | None = None,
     smoothing: Smoothing = Smoothing.PRESERVE_BOUNDARIES,
 ) -> Float[np.ndarray, "D K"]:
@@ -38,6 +39,7 @@ def refine_corners(
     first = first_places(patch, int(patch.max(initial=-1)) + 1)
     columns, vertex_of = values[first], vertices[first]
     plain = build_topology((patch, offsets), len(columns))
+    plain = plain.with_vertex_sharpness(vertex_sharpness[vertex_of])
     sharp: Int[np.ndarray, "N 2"] | None = None
     for level in range(levels):
         topology = plain

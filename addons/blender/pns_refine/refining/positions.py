@@ -14,6 +14,7 @@ from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.parallel import Blocks, available_threads
 from pns_common.reference_length import measure_reference_length
 from pns_common.schemes import named_scheme
+from pns_common.topology import Topology
 
 from .steps import Steps
 
@@ -34,11 +35,9 @@ class Positions:
 
 
 def refine_positions(
-    mesh: Mesh, scheme: Scheme, steps: Steps, border: str, *, limit: bool, progress: Progress
+    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
 ) -> Positions:
     """Refine the vertices of a mesh; ``limit`` puts them where the base scheme would end.
-
-    ``border`` is the rule of boundaries, as in ``Creases``.
 
     A crease that the last level keeps sharp is then sharp for good, as ``refine`` has it.
 
@@ -46,8 +45,9 @@ def refine_positions(
         PnsError: the mesh cannot be refined, or the model fails; and whatever ``progress`` raises.
     """
     if steps.wears_off:
-        return _level_by_level(mesh, scheme, steps, border, limit=limit, progress=progress)
-    creases, levels = Creases(steps.steps[0].creases, border=border), len(steps.steps)
+        return _level_by_level(mesh, scheme, steps, limit=limit, progress=progress)
+    first, levels = steps.steps[0], len(steps.steps)
+    creases = _with_corners(Creases(first.creases), first.topology)
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
     added = next((step.added for step in reversed(made.steps) if step.added), None)
     acted = made if added is None else added
@@ -55,7 +55,7 @@ def refine_positions(
 
 
 def _level_by_level(
-    mesh: Mesh, scheme: Scheme, steps: Steps, border: str, *, limit: bool, progress: Progress
+    mesh: Mesh, scheme: Scheme, steps: Steps, *, limit: bool, progress: Progress
 ) -> Positions:
     """Refine level by level with the creases of each; half sharp ones mix two readings.
 
@@ -64,15 +64,16 @@ def _level_by_level(
     the base scheme is the larger of both.
     """
     length = measure_reference_length(mesh.vertices, mesh.corners)
-    counter, acted = _Counter(progress, steps, border), None
+    counter, acted = _Counter(progress, steps), None
     reports: list[Any] = []
     distances: list[_Distances] = []
     for depth, step in enumerate(steps.steps):
         rule = scheme if scheme.acts_at(depth) else named_scheme(steps.base.name)
-        smooth = made = counter.reading(mesh, rule, length, step.soft.with_named(step.creases))
+        soft = _with_corners(step.soft, step.topology)
+        smooth = made = counter.reading(mesh, rule, length, soft.with_named(step.creases))
         points, readings = made.mesh.vertices, [_distances(made.report)]
         if step.mixture is not None:
-            made = counter.reading(mesh, rule, length, step.soft.with_named(step.mixture.creases))
+            made = counter.reading(mesh, rule, length, soft.with_named(step.mixture.creases))
             points = step.mixture.of(smooth.mesh.vertices, made.mesh.vertices)
             readings.append(_distances(made.report))
         acted = made if acted is None or scheme.acts_at(depth) else acted
@@ -88,6 +89,12 @@ def _level_by_level(
         normals = limit_normals(mesh.vertices, *at_last).vertices
     report = _one_report(reports, _combined(distances, sum))
     return Positions(points, acted.ratio, acted.gate, normals, report)
+
+
+def _with_corners(creases: Creases, topology: Topology) -> Creases:
+    """Return creases with the vertices that are corners of a level's topology, borders' too."""
+    vertices = np.flatnonzero(topology.vertex_sharpness)
+    return replace(creases, vertices=vertices, vertex_sharpness=topology.vertex_sharpness[vertices])
 
 
 def _distances(report: Any) -> _Distances:
@@ -113,8 +120,8 @@ def _one_report(reports: list[Any], distances: _Distances) -> dict[str, Any]:
 class _Counter:
     """Refines by one level, and counts the faces made over all of them."""
 
-    def __init__(self, progress: Progress, steps: Steps, border: str) -> None:
-        self._progress, self._done, self._border = progress, 0, border
+    def __init__(self, progress: Progress, steps: Steps) -> None:
+        self._progress, self._done = progress, 0
         following = [step.topology for step in steps.steps[1:]] + [steps.final]
         self._total = sum(
             finer.face_count * (1 if step.mixture is None else 2)
@@ -128,7 +135,6 @@ class _Counter:
         length: float,
         creases: Creases,
     ) -> Refinement:
-        creases = replace(creases, border=self._border)
         made = refine(mesh, scheme, 1, length, creases=creases, progress=self._tell)
         self._done += made.mesh.face_count
         return made

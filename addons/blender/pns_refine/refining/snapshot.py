@@ -75,6 +75,7 @@ class Snapshot:
         polygon_corners: (P + 1,) where each polygon's corners begin.
         edges: (E, 2) vertices of the mesh's own edges.
         crease_sharpness: (E,) how many levels an edge stays sharp; infinity for a crease for good.
+        vertex_sharpness: (V,) of vertices.
         groups: (V, G) weights of the vertex groups.
         offsets: (K, V, 3) how far each shape key moves the vertices.
         layers: all attributes.
@@ -87,6 +88,7 @@ class Snapshot:
     polygon_corners: Int[np.ndarray, " P+1"]
     edges: Int[np.ndarray, "E 2"]
     crease_sharpness: Float[np.ndarray, " E"]
+    vertex_sharpness: Float[np.ndarray, " V"]
     groups: Float[np.ndarray, "V G"]
     offsets: Float[np.ndarray, "K V 3"]
     layers: tuple[Layer, ...]
@@ -155,6 +157,7 @@ class Refined:
     faces: Faces
     edges: Int[np.ndarray, "E 2"]
     crease_sharpness: Float[np.ndarray, " E"]
+    vertex_sharpness: Float[np.ndarray, " W"]
     groups: Float[np.ndarray, "W G"]
     offsets: Float[np.ndarray, "K W 3"]
     layers: tuple[Layer, ...]

@@ -201,11 +201,14 @@ def test_an_armature_bends_the_result():
 
 @pytest.mark.parametrize("boundary", ["ALL", "PRESERVE_CORNERS"])
 def test_without_correction_quads_are_those_of_subdivision_surface(boundary):
-    """Suzanne, with a sharp edge, against Blender's own OpenSubdiv."""
+    """Suzanne, with a sharp edge and sharp points, against Blender's own OpenSubdiv."""
     bpy.ops.mesh.primitive_monkey_add(calc_uvs=True)
     obj = bpy.context.object
     crease = obj.data.attributes.new("crease_edge", "FLOAT", "EDGE")
     crease.data[0].value = 1
+    # Sharp at no level, at a part of one, at more, and for good.
+    sharp = np.resize([0, 0.25, 0, 0.35, 0.6, 1, 0], len(obj.data.vertices)).astype(np.float32)
+    obj.data.attributes.new("crease_vert", "FLOAT", "POINT").data.foreach_set("value", sharp)
     modifier = obj.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels, modifier.use_limit_surface, modifier.boundary_smooth = 2, False, boundary
     own = evaluated(obj).copy()
@@ -213,6 +216,10 @@ def test_without_correction_quads_are_those_of_subdivision_surface(boundary):
     new = refined(obj, levels=2, budget=0.0, border=boundary).data
     assert [len(p.vertices) for p in new.polygons] == [4] * len(own.polygons)
     (places, uv), (expected, uv_expected) = corners_of(new), corners_of(own)
+    left = numbers(new.attributes["crease_vert"].data, "value")[: len(sharp), 0]
+    np.testing.assert_allclose(
+        left, np.sqrt(np.clip(sharp**2 - 0.2, 0, 1) + 0.2 * (sharp == 1)), atol=1e-6
+    )
     tree = KDTree(len(expected))
     for number, place in enumerate(expected):
         tree.insert(place, number)
@@ -262,7 +269,6 @@ def test_every_loss_is_named():
     obj = placed("Many", [(0, 0, 0), (1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0)], [(0, 1, 2, 3, 4)])
     obj.data.attributes.new("id", "INT", "POINT")
     obj.data.attributes.new("stress", "FLOAT", "EDGE")
-    obj.data.attributes.new("crease_vert", "FLOAT", "POINT").data[0].value = 1
     obj.vertex_groups.new(name="g").add([0], 0.0, "REPLACE")
     obj.modifiers.new("Hook", "HOOK")
     obj.modifiers.new("Cloth", "CLOTH")
@@ -275,7 +281,6 @@ def test_every_loss_is_named():
         "triangles",
         "id",
         "stress",
-        "vertex creases",
         "weight 0",
         "Hook",
         "Cloth",

@@ -151,6 +151,7 @@ def test_edges_without_faces_stay_as_they_are():
             "points": np.concatenate([shape.points, [[3, 0, 0], [4, 0, 0]]]),
             "edges": np.concatenate([shape.edges, [[8, 9]]]),
             "crease_sharpness": np.append(shape.crease_sharpness, 0.0),
+            "vertex_sharpness": np.zeros(10),
             "groups": np.zeros((10, 0)),
         }
     )

@@ -12,7 +12,7 @@ from addons.blender.pns_refine.refining.steps import (
     level_steps,
     refine_columns,
 )
-from pns_common import Mesh, catmull_clark, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, catmull_clark, load_model, loop, pns, refine
 from pns_common.columns import level_topologies
 from pns_common.columns import refine_columns as refine_by_library
 from pns_common.model.file import DEFAULT_MODEL
@@ -104,6 +104,24 @@ def test_what_is_left_stands_on_the_halves():
     assert sorted(set(made.crease_sharpness)) == [0, 0.5]
     assert (made.crease_sharpness > 0).sum() == 12 * 4
     assert not (compute(cube(2.5), Choice(None, 3)).crease_sharpness > 0).any()
+
+
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("crease_sharpness", [0.0, 0.4, np.inf])
+def test_sharp_vertices_are_the_librarys_and_wear_off(whole, crease_sharpness):
+    shape, sharpness = cube(), [1.5, np.inf, 2.25]
+    shape.crease_sharpness[:4], shape.vertex_sharpness[:3] = crease_sharpness, sharpness
+    shape, base = (shape, catmull_clark()) if whole else (cut(shape), loop())
+    made = compute(shape, Choice(load_model(), 2, budget=0.0))
+    if crease_sharpness != 0.4:
+        edges = shape.edges[:4] if crease_sharpness else None
+        kept = Creases(edges, vertices=[0, 1, 2], vertex_sharpness=sharpness)
+        mesh = shape.control(whole=whole).mesh
+        expected = refine(mesh, base, 2, creases=kept).mesh.vertices
+        np.testing.assert_allclose(made.points, expected, atol=1e-14)
+    np.testing.assert_allclose(made.points[1], shape.points[1], atol=1e-14)
+    assert made.vertex_sharpness[:3].tolist() == [0, np.inf, 0.25]
+    assert not made.vertex_sharpness[3:].any()
 
 
 @pytest.mark.parametrize(("degrees", "sharp"), [(89.9, True), (90.1, False)])

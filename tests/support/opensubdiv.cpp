@@ -1,9 +1,10 @@
-// OpenSubdiv's Catmull-Clark in double precision, with infinitely sharp creases.
+// OpenSubdiv's Catmull-Clark or Loop in double precision, with infinitely sharp creases.
 //
-// Standard input: counts V F C and the levels; V points; F faces, each its degree and its vertices;
-// C creases, each two vertices. Standard output, for each corner of each refined quad: its position,
-// its limit and both limit tangents. Quads come as the children of corner 0, 1, ... of face 0, 1, ...,
-// level by level, each from the old vertex on.
+// Standard input: the degree D of refined faces (4 or 3), counts V F C S and the levels; V points;
+// F faces, each its degree and its vertices; C creases, each two vertices; S vertices, each with its
+// sharpness. Standard output, for each corner of each refined face: its position, its limit and both
+// limit tangents. Faces come as the children of corner 0, 1, ... of face 0, 1, ..., level by level,
+// each from the old vertex on; in Loop's scheme the middle one last, from the first edge's vertex on.
 #include <opensubdiv/far/primvarRefiner.h>
 #include <opensubdiv/far/topologyDescriptor.h>
 
@@ -27,8 +28,9 @@ struct Face {
 };
 
 int main() {
-    int vertices, faces, creases, levels;
-    if (std::scanf("%d %d %d %d", &vertices, &faces, &creases, &levels) != 4) return 2;
+    int degree, vertices, faces, creases, sharp, levels;
+    if (std::scanf("%d %d %d %d %d %d", &degree, &vertices, &faces, &creases, &sharp, &levels) != 6)
+        return 2;
     std::vector<Point> points(vertices);
     for (Point& p : points)
         if (std::scanf("%lf %lf %lf", &p.x[0], &p.x[1], &p.x[2]) != 3) return 2;
@@ -39,6 +41,10 @@ int main() {
     }
     for (int& v : pairs)
         if (std::scanf("%d", &v) != 1) return 2;
+    std::vector<int> tips(sharp);
+    std::vector<float> of_tips(sharp);
+    for (int i = 0; i < sharp; ++i)
+        if (std::scanf("%d %f", &tips[i], &of_tips[i]) != 2) return 2;
     const std::vector<float> sharpness(creases, Sdc::Crease::SHARPNESS_INFINITE);
 
     using Descriptor = Far::TopologyDescriptor;
@@ -51,10 +57,13 @@ int main() {
     descriptor.numCreases = creases;
     descriptor.creaseVertexIndexPairs = pairs.data();
     descriptor.creaseWeights = sharpness.data();
+    descriptor.numCorners = sharp;
+    descriptor.cornerVertexIndices = tips.data();
+    descriptor.cornerWeights = of_tips.data();
     Sdc::Options options;
     options.SetVtxBoundaryInterpolation(Sdc::Options::VTX_BOUNDARY_EDGE_ONLY);
     const std::unique_ptr<Far::TopologyRefiner> refiner(
-        Factory::Create(descriptor, Factory::Options(Sdc::SCHEME_CATMARK, options)));
+        Factory::Create(descriptor, Factory::Options(degree == 3 ? Sdc::SCHEME_LOOP : Sdc::SCHEME_CATMARK, options)));
     Far::TopologyRefiner::UniformOptions uniform(levels);
     uniform.fullTopologyInLastLevel = true;
     refiner->RefineUniform(uniform);
@@ -70,11 +79,12 @@ int main() {
         std::vector<Face> split;
         for (const Face& face : order) {
             const Far::ConstIndexArray children = before.GetFaceChildFaces(face.number);
-            const int count = children.size();
+            const int count = degree == 3 ? 3 : children.size();
             for (int j = 0; j < count; ++j) {
                 const int corner = (face.turn + j) % count;
-                split.push_back({children[corner], count == 4 ? corner : 0});
+                split.push_back({children[corner], count == degree ? corner : 0});
             }
+            if (degree == 3) split.push_back({children[3], (face.turn + 2) % 3});
         }
         order.swap(split);
     }
@@ -82,9 +92,9 @@ int main() {
     primvar.Limit(points, limits, along, across);
     const Far::TopologyLevel last = refiner->GetLevel(levels);
     for (const Face& face : order) {
-        const Far::ConstIndexArray quad = last.GetFaceVertices(face.number);
-        for (int j = 0; j < 4; ++j) {
-            const int v = quad[(face.turn + j) % 4];
+        const Far::ConstIndexArray corners = last.GetFaceVertices(face.number);
+        for (int j = 0; j < degree; ++j) {
+            const int v = corners[(face.turn + j) % degree];
             for (const Point* p : {&points[v], &limits[v], &along[v], &across[v]})
                 std::printf("%.17g %.17g %.17g ", p->x[0], p->x[1], p->x[2]);
         }
