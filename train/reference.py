@@ -164,7 +164,7 @@ def edge_frames(edges: EdgeReading, *, first_face: bool) -> Frames:
 
 
 def edge_extents(edges: EdgeReading) -> Float[Tensor, " E"]:
-    """Return ℓ: the length of each edge, or the mean altitude of c and d over it if that is less."""
+    """Return ℓ: the length of each edge, or the mean altitude over it if that is less."""
     along = edges.b - edges.a
     areas = [torch.linalg.cross(along, side - edges.a) for side in (edges.c, edges.d)]
     length = root(dot(along, along))
