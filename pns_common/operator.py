@@ -7,7 +7,7 @@ vertex (H. Ugail, *Proximity-Preserving Neural Subdivision*). The paper's rule, 
 
 The default's rule, models of format 4, acts at the control mesh alone:
 
-    x = x0 + s δ      δ = γ Π_ρ( D + τ h F z(φ) )      ‖z‖ ≤ 1,  ρ = C h² / R
+    x = x0 + s δ      δ = γ Π_ρ( D + τ ℓ F z(φ) )      ‖z‖ ≤ 1,  ρ = C h² / R
 
     x0 = S p   the base scheme S applied to the control points p
     D  = S d   the prior: S applied to pushes d that undo the shrinking of S         ``pushes``
@@ -15,16 +15,19 @@ The default's rule, models of format 4, acts at the control mesh alone:
                of which Catmull–Clark's scheme has one for each face, the face's normal alone
     φ          features of the edge, of the ring or the face, and z(φ) the network's answer
     h          the edge's length; elsewhere the root mean square of the ring's or face's edges
+    ℓ          h, or less where that is long and thin: at an edge at most the mean altitude of what
+               lies across it, at a face its shortest side
     γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
                x = 1 − n1 · n2, b the smaller mean of x over the edges of both faces;
                tanh(c_v x_v) elsewhere, x_v the mean of x over the ring's or the face's edges
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
-C is the budget, R the mesh's unit of length, τ the share of h that the network may ask for. On a
+C is the budget, R the mesh's unit of length, τ the share of ℓ that the network may ask for. On a
 boundary or a crease there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it
 still meet there. Sharpness in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an edge,
-(1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex.
+(1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex, and (1 − w̄) δ at a face's vertex, w̄
+the mean over the face's edges.
 """
 
 from __future__ import annotations
@@ -128,7 +131,7 @@ class Inputs:
         basis: F as rows T, N, B (or the three ring vectors), (N, 9).
         gate: γ.
         bound: ρ.
-        reach: τ h.
+        reach: τ ℓ.
         weight: 1, less at soft edges, at vertices on soft curves and at corners.
         degenerate: where there is no frame.
     """
@@ -246,12 +249,12 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
     basis = np.empty((count, 9))
     features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
-    (curvature, sides, length), degenerate = np.empty((3, count)), np.empty(count, dtype=bool)
+    (curvature, sides, length, extent), degenerate = np.empty((4, count)), np.empty(count, bool)
     has_prior = rule.prior_strength is not None
     fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
     bends = level.face_bends if has_prior else level.logs[:0]
     measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
-    to = basis, curvature, sides, length, degenerate, features
+    to = basis, curvature, sides, length, extent, degenerate, features
     if mesh.triangles:
         of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
         frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
@@ -268,7 +271,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         basis,
         gate=gate,
         bound=budget_per_length(level, rule) * (length * length),
-        reach=rule.network_scale * length,
+        reach=rule.network_scale * extent,
         weight=1 - mesh.soft[rows] if len(mesh.soft) else np.ones(count),
         degenerate=degenerate,
     )
@@ -298,7 +301,7 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     mesh, count, edges = level.topology, len(rows), level.edges
     made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
     of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
-    of_edges = edges.lengths, edges.jumps, edges.bends
+    of_edges = edges.lengths, edges.jumps, edges.bends, mesh.sharpness
     frames.measure_face_vertices(
         level.points, level.rings.fields, *of_faces, *of_edges, rows, 0, count, made
     )
@@ -309,8 +312,8 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         basis,
         gate=np.tanh(rule.vertex_gate_sharpness * level.face_bends[rows]),
         bound=budget_per_length(level, rule) * square,
-        reach=rule.network_scale * np.sqrt(square),
-        weight=np.ones(count),
+        reach=rule.network_scale * made[:, frames.EXTENT],
+        weight=made[:, frames.SMOOTH],
         degenerate=np.zeros(count, dtype=bool),
     )
 

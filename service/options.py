@@ -114,9 +114,6 @@ class Options:
         return None if self.reference_length == "auto" else self.reference_length
 
 
-# What a parameter is where it is not given.
-DEFAULTS = Options()
-
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
     "levels": f"depth, 1 to {MAX_LEVELS}: each level makes four faces of one",

@@ -5,7 +5,7 @@ finds edges by itself, sums in any order, and runs at a thousandth of the kernel
 float64. Symbols are those of docs/features.md; a, b, c, d are an edge's ends and opposite vertices.
 
     format 1    q  = q0 + h² γ (C / R) F Π₁ η(φ)
-    format 4    x' = x0 + s γ Π_ρ(D + τ h F z(φ)),    ρ = C h² / R,    x0 = S_w p
+    format 4    x' = x0 + s γ Π_ρ(D + τ ℓ F z(φ)),    ρ = C h² / R,    x0 = S_w p
 """
 
 import math
@@ -161,6 +161,14 @@ def edge_frames(edges: EdgeReading, *, first_face: bool) -> Frames:
     axes = torch.stack([tangent, normal, torch.linalg.cross(tangent, normal)], dim=2)
     no_curvature = undefined if first_face else degenerate
     return Frames(axes, length, torch.where(no_curvature, 0.0, 1 - cosine), degenerate)
+
+
+def edge_extents(edges: EdgeReading) -> Float[Tensor, " E"]:
+    """Return ℓ: the length of each edge, or the mean altitude over it if that is less."""
+    along = edges.b - edges.a
+    areas = [torch.linalg.cross(along, side - edges.a) for side in (edges.c, edges.d)]
+    length = root(dot(along, along))
+    return torch.minimum(length, ratio(sum(root(dot(area, area)) for area in areas), 2 * length))
 
 
 def paper_5(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float[Tensor, "E 5"]:
@@ -338,7 +346,7 @@ class GeneralRule:
         edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
         z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)
         local = torch.zeros_like(edges.a).index_put((interior,), z)
-        turned = frames.length[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
+        turned = edge_extents(edges)[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
         jump = around.mean(around.turns[0])[:, 0]
         vertex_gate = (1 - blend) * ringed * torch.tanh(self.vertex_gate_sharpness * jump)
         z = shortened(self.vertex_network(ring_10(around)[ringed]), one)

@@ -90,12 +90,12 @@ def correct_by_prior(
     gates,
     bounds,
 ):
-    """Write δ = w γ Π_ρ(D + τ h F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
+    """Write δ = w γ Π_ρ(D + τ ℓ F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 
     Row 0 of the arrays from ``z`` to ``weight`` is that of rows[begin].
 
     Args:
-        reach: τ h, the length that the network may ask for.
+        reach: τ ℓ, the length that the network may ask for.
         bound: ρ.
         weight: w, 1 but at soft edges.
         displacement: in: D; out: δ.

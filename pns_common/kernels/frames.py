@@ -47,6 +47,15 @@ def edge_frame(n, m, spoke):
     return tangent, normal, cross(tangent, normal), 0.0 if undefined else 1 - cosine, fallback
 
 
+@inlined
+def _extent(p, q, c, d):
+    """Return the length of an edge from p to q, or the mean altitude of c and d over it if less."""
+    spoke = difference(q, p)
+    h = root(dot(spoke, spoke))
+    twice = norm(cross(spoke, difference(c, p))) + norm(cross(spoke, difference(d, p)))
+    return min(h, twice / (2 * h)) if h > 0 else 0.0
+
+
 @kernel
 def frames_and_features(
     points,
@@ -67,6 +76,7 @@ def frames_and_features(
     curvature,
     sides,
     length,
+    extent,
     degenerate,
     features,
 ):
@@ -82,6 +92,7 @@ def frames_and_features(
         curvature: (N,) out: x.
         sides: (N,) out: the smaller bend of both faces, 0 where there is no frame.
         length: (N,) out: h.
+        extent: (N,) out: ℓ.
         degenerate: (N,) out: whether the frame is the fallback.
         features: (N, K) out; K = 5, 14 or 18.
     """
@@ -109,6 +120,8 @@ def frames_and_features(
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
         if len(bends):
             sides[to] = 0.0 if fallback else min(bends[h1 // 3], bends[h2 // 3])
+        p, q = row(points, a), row(points, b)
+        extent[to] = _extent(p, q, row(points, c), row(points, d))
         features[to, 0] = x
         features[to, LOGS] = logs[ac] - logs[e]
         features[to, LOGS + 1] = logs[bc] - logs[e]
@@ -191,6 +204,7 @@ def polygon_frames_and_features(
     curvature,
     sides,
     length,
+    extent,
     degenerate,
     features,
 ):
@@ -219,6 +233,7 @@ def polygon_frames_and_features(
         c = wing(points, h1, corners, offsets, face_of_corner)
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)
+        extent[to] = _extent(p, q, c[:3], d[:3])
         features[to, 0] = x
         features[to, LOGS] = _log_ratio(c, p, logs[e])
         features[to, LOGS + 1] = _log_ratio(c, q, logs[e])
@@ -233,8 +248,8 @@ def polygon_frames_and_features(
 
 # --- face vertices --------------------------------------------------------------------------------
 
-# Columns of a face's measures: its normal, h², and face-8.
-NORMAL, SQUARE, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 12
+# Columns of a face's measures: its normal, h², ℓ, the mean of 1 − w over its edges, and face-8.
+NORMAL, SQUARE, EXTENT, SMOOTH, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 6, 14
 
 
 @kernel
@@ -247,6 +262,7 @@ def measure_face_vertices(
     lengths,
     jumps,
     bends,
+    sharpness,
     rows,
     begin,
     end,
@@ -258,8 +274,8 @@ def measure_face_vertices(
     scaled to length 1 where that is above CLEAR_NORMAL.
 
     Args:
-        lengths, jumps, bends: (E,) of the edges: h, x, signed sine.
-        measures: (N, 12) out.
+        lengths, jumps, bends, sharpness: (E,) of the edges: h, x, signed sine, w.
+        measures: (N, 14) out.
     """
     for i in range(begin, end):
         f, to = rows[i], i - begin
@@ -271,7 +287,7 @@ def measure_face_vertices(
             centre = centre[0] + p[0] / count, centre[1] + p[1] / count, centre[2] + p[2] / count
         mean, area = (0.0, 0.0, 0.0), 0.0
         square, length, shortest, longest = 0.0, 0.0, math.inf, 0.0
-        jump, bend, least, most = 0.0, 0.0, math.inf, -math.inf
+        jump, bend, smooth, least, most = 0.0, 0.0, 0.0, math.inf, -math.inf
         height, lowest, highest = 0.0, math.inf, -math.inf
         for h in range(first, stop):
             after = h + 1 if h + 1 < stop else first
@@ -285,6 +301,7 @@ def measure_face_vertices(
             shortest, longest = min(shortest, lengths[e]), max(longest, lengths[e])
             jump += jumps[e] / count
             bend += bends[e] / count
+            smooth += (1 - sharpness[e]) / count
             least, most = min(least, bends[e]), max(most, bends[e])
             height += umbrella / count
             lowest, highest = min(lowest, umbrella), max(highest, umbrella)
@@ -296,7 +313,7 @@ def measure_face_vertices(
             unevenness += over_plane * over_plane / count
         for k in range(3):
             measures[to, NORMAL + k] = normal[k]
-        measures[to, SQUARE] = square
+        measures[to, SQUARE], measures[to, EXTENT], measures[to, SMOOTH] = square, shortest, smooth
         measures[to, FACE_FEATURES] = jump
         measures[to, FACE_FEATURES + 1] = bend
         measures[to, FACE_FEATURES + 2] = (most + least) / 2

@@ -96,17 +96,13 @@ def _positions(
     if not len(counts):
         return np.zeros((0, 3)), None
     values = text.numbers(text.words_of(lines))
-    width = int(counts[0])
-    if (counts == width).all():
-        rows = values.reshape(-1, width)
-        return np.ascontiguousarray(rows[:, :3]), rows[:, 3:7] if width >= 6 else None
-    starts = np.cumsum(counts) - counts
-    coloured = np.flatnonzero(counts >= 6)
-    if not len(coloured):
-        return values[starts[:, None] + np.arange(3)], None
-    colours = np.ones((len(counts), 3))
-    colours[coloured] = values[starts[coloured, None] + np.arange(3, 6)]
-    return values[starts[:, None] + np.arange(3)], colours
+    coloured = counts >= 6
+    alike = bool((counts == counts[0]).all())
+    rows = values.reshape(len(counts), -1) if alike else _rows(values, counts, 6)
+    colours = rows[:, 3:7] if coloured.any() else None
+    if colours is not None:
+        colours[~coloured] = 1.0
+    return np.ascontiguousarray(rows[:, :3]), colours
 
 
 def _references(
@@ -193,11 +189,18 @@ def _values(
     values = parsed(text.cut(words).tobytes())
     if (counts < least).any() or len(values) != len(words):
         return None
-    starts = np.cumsum(counts) - counts
-    columns = np.minimum(np.arange(width), counts[:, None] - 1)
-    rows = values[starts[:, None] + columns]
-    rows[counts[:, None] <= np.arange(width)] = 0.0
+    rows = _rows(values, counts, width)
     return rows if np.isfinite(rows).all() else None
+
+
+def _rows(
+    values: Float[np.ndarray, " N"], counts: Int[np.ndarray, " R"], width: int
+) -> Float[np.ndarray, "R K"]:
+    """Return the first `width` of the numbers of each row, 0 for those that it has not."""
+    starts = np.cumsum(counts) - counts
+    rows = values[starts[:, None] + np.minimum(np.arange(width), counts[:, None] - 1)]
+    rows[counts[:, None] <= np.arange(width)] = 0.0
+    return rows
 
 
 def _statements(

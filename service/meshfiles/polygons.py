@@ -123,7 +123,7 @@ def refine_polygons(
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
         refined = replace(refined, parents=parents)
-    (misses,) = near_misses(control.mesh, [made.reference_length])
+    (misses,) = near_misses(control.mesh.vertices, made.topologies[0], [made.reference_length])
     told = {
         "vertices joined within weld_tolerance": control.near,
         "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),

@@ -85,11 +85,6 @@ class Text:
         """Return the error of a line that cannot be read."""
         return UnreadableError(f"line {self.number(line)} of the {self.what} file: {problem}")
 
-    def line(self, line: int) -> bytes:
-        """Return a line."""
-        end = self.starts[line + 1] if line + 1 < len(self.starts) else len(self.letters)
-        return self.letters[self.starts[line] : end].tobytes()
-
     def keyword(self, word: bytes) -> Bool[np.ndarray, " L"]:
         """Return which lines begin with a word."""
         known = np.flatnonzero(self.counts)
@@ -107,10 +102,10 @@ class Text:
             same[some] = (self.letters[begins[some] + place] | 32) == letter
         return same
 
-    def words_of(self, lines: Bool[np.ndarray, " L"], skip: int = 1) -> Int[np.ndarray, " K"]:
-        """Return the words of some lines but the first `skip` of each."""
-        counts = np.maximum(self.counts[lines] - skip, 0)
-        firsts = np.repeat(self.first[lines] + skip - (np.cumsum(counts) - counts), counts)
+    def words_of(self, lines: Bool[np.ndarray, " L"]) -> Int[np.ndarray, " K"]:
+        """Return the words of some lines but the first of each."""
+        counts = self.counts[lines] - 1
+        firsts = np.repeat(self.first[lines] + 1 - (np.cumsum(counts) - counts), counts)
         return firsts + np.arange(len(firsts))
 
     def cut(self, words: Int[np.ndarray, " K"]) -> UInt8[np.ndarray, " n"]:

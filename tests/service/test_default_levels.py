@@ -8,7 +8,7 @@ import pytest
 
 from pns_common import pyvista, refine, subdivide
 from service.http.parameters import Parameters
-from service.options import DEFAULTS
+from service.options import Options
 
 ROOT = Path(__file__).resolve().parents[2]
 DEFAULT_LEVELS = 2
@@ -24,7 +24,7 @@ def test_python_refines_by_two_levels(door):
 
 
 def test_the_command_and_http_refine_as_deep_as_python():
-    assert DEFAULTS.levels == Parameters().levels == DEFAULT_LEVELS
+    assert Options().levels == Parameters().levels == DEFAULT_LEVELS
 
 
 @pytest.mark.parametrize(

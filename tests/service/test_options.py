@@ -10,7 +10,7 @@ import pytest
 from service.cli.commands import subdivide
 from service.errors import InvalidParameter
 from service.http.parameters import Parameters
-from service.options import DEFAULTS, Options
+from service.options import Options
 
 WRONG = [
     ("levels", 0),
@@ -74,7 +74,7 @@ def test_angles_are_in_degrees_and_other_creases_have_none():
 
 
 def test_the_command_line_and_http_take_these_options_with_their_defaults():
-    own = asdict(DEFAULTS)
+    own = asdict(Options())
     over_http = {name: field.default for name, field in Parameters.model_fields.items()}
     assert over_http == {**own, "model": None, "format": "glb"}
     on_the_line = {n: p.default for n, p in inspect.signature(subdivide).parameters.items()}

@@ -1,6 +1,6 @@
 """A control mesh with its networks, differentiable in their weights: all that is trained.
 
-    x₁ = S_w p + s δ     δ = (1 − w) γ Π_ρ(D + τ h F z(φ)) + w Π_ρ(D_c)     D = S_w d
+    x₁ = S_w p + s δ     δ = (1 − w) γ Π_ρ(D + τ ℓ F z(φ)) + w Π_ρ(D_c)     D = S_w d
     x₂ = S_w x₁, with the sharpness that halves of edges inherit; then the smooth scheme
 
 Sharpness w is a network's too. The library measures features, frames, gates and pushes once;
@@ -45,7 +45,7 @@ class Inputs:
         rows: their numbers among vertices, edges or faces.
         features: φ.
         axes: F, the three vectors of a ring, or a face's normal, as columns.
-        gate, bound, reach: γ, ρ and τ h.
+        gate, bound, reach: γ, ρ and τ ℓ.
     """
 
     rows: Int[Tensor, " N"]
@@ -58,7 +58,7 @@ class Inputs:
     def corrected(
         self, network: BoundedNet, prior: Float[Tensor, "M 3"], gate: Float[Tensor, " N"]
     ) -> Float[Tensor, "M 3"]:
-        """Return γ Π_ρ(D + τ h F z(φ)) at all M vertices, edges or faces; 0 beside these rows."""
+        """Return γ Π_ρ(D + τ ℓ F z(φ)) at all M vertices, edges or faces; 0 beside these rows."""
         z = unit_correction(network)(self.features)
         turned = (self.axes[:, :, : z.shape[1]] @ z[:, :, None])[:, :, 0]
         wanted = prior[self.rows] + self.reach[:, None] * turned
@@ -160,9 +160,7 @@ class LearnedLevel:
         length = between[:, 1] - between[:, 0]
         middle = shortened(along[self.edges].mean(dim=1), n["budget"] * dot(length, length))
         w = sharp.edge
-        bends = self.jumps.new_zeros(self.level.topology.face_count).index_add(
-            0, self.corner_faces, (self.jumps * (1 - w))[self.corner_edges]
-        ) / torch.bincount(self.corner_faces)
+        bends, smooth = self.face_means(self.jumps * (1 - w)), self.face_means(1 - w)
         smoothed = bends[self.sides].amin(dim=1)
         opened = torch.where(self.degenerate, 0.0, torch.tanh(n["vertex_gate"] * smoothed))
         own = self.at_edges.gate
@@ -170,9 +168,16 @@ class LearnedLevel:
         edges = self.at_edges.corrected(networks.edge, prior[count : count + len(w)], gate)
         made = [vertices + curved * on_curve, edges + w[:, None] * middle]
         if networks.face is not None:
-            gate = torch.tanh(n["vertex_gate"] * bends)
+            gate = smooth * torch.tanh(n["vertex_gate"] * bends)
             made += [self.at_faces.corrected(networks.face, prior[count + len(w) :], gate)]
         return torch.cat(made)
+
+    def face_means(self, values: Float[Tensor, " E"]) -> Float[Tensor, " F"]:
+        """Return means over the edges of each face."""
+        sums = values.new_zeros(self.level.topology.face_count).index_add(
+            0, self.corner_faces, values[self.corner_edges]
+        )
+        return sums / torch.bincount(self.corner_faces)
 
     def second(self, sharp: Sharpness, first: Float[Tensor, "W 3"]) -> Float[Tensor, "M 3"]:
         """Return x₂ of x₁."""

@@ -18,7 +18,7 @@ from pns_common.report import Report
 from pns_common.rows import disjoint_faces, extent
 from pns_common.schemes import Scheme
 from pns_common.sharpness import creases_by_name
-from pns_common.topology import split_faces
+from pns_common.topology import Topology, split_faces
 
 from ...course import Course
 from ...errors import UnrefinableError
@@ -46,6 +46,7 @@ class RefinedMesh:
         scalars: further attributes by name.
         limit_normals: normals to use in place of those of the faces; None: none.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
+        topology: of the control mesh; None for a union.
     """
 
     mesh: Mesh
@@ -55,6 +56,7 @@ class RefinedMesh:
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
     parents: SubdivisionMatrix | None = None
+    topology: Topology | None = None
 
 
 def creases_of(
@@ -145,6 +147,7 @@ def refined_mesh(
         _scalars(made, options),
         made.normals if options.normals == "limit" else None,
         made.parents if traced else None,
+        levels[0],
     )
 
 

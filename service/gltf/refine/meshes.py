@@ -297,8 +297,9 @@ def refine_alone(
     ]
     (near,), (cut,) = control.near.tolist(), [0] if made is None else made.cut.tolist()
     changes += changes_of_vertices(near, cut, pointer)
-    if made is not None:
-        (misses,) = near_misses(control.surface, [made.reports[0]["reference_length"]])
+    if made is not None and made.topology is not None:
+        length = made.reports[0]["reference_length"]
+        (misses,) = near_misses(control.surface.vertices, made.topology, [length])
         changes += near_miss_changes(misses, pointer)
         changes += opposed_normals(refined, pointer)
     return MeshOutcome(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
-from pns_common.mesh import Mesh
+from pns_common.topology import Topology
 
 from ...meshes.weld_tolerance import near_labels
 from ...report import Change
@@ -18,14 +18,17 @@ NEAR = 1e-5
 
 
 def near_misses(
-    mesh: Mesh, lengths: Sequence[float], part: Int[np.ndarray, " V"] | None = None
+    points: Float[np.ndarray, "V 3"],
+    topology: Topology,
+    lengths: Sequence[float],
+    part: Int[np.ndarray, " V"] | None = None,
 ) -> list[int]:
     """Count the border vertices of each part that lie within NEAR of another.
 
     `lengths` are the parts' own R. `part` is the part of each vertex; None: the mesh is one part.
     """
     counts = np.zeros(len(lengths), dtype=np.int64)
-    border = np.flatnonzero(border_vertices(mesh))
+    border = np.flatnonzero(border_vertices(topology))
     if not len(border):
         return counts.tolist()
     whose = np.zeros(len(border), dtype=np.int64) if part is None else part[border]
@@ -33,7 +36,7 @@ def near_misses(
     border, whose = border[order], whose[order]
     owners, first = np.unique(whose, return_index=True)
     distance = NEAR * np.array(lengths, dtype=np.float64)[owners]
-    labels = near_labels(mesh.vertices[border], distance, whose, first)
+    labels = near_labels(points[border], distance, whose, first)
     shared = np.bincount(labels)[labels] > 1
     np.add.at(counts, whose[shared], 1)
     return counts.tolist()

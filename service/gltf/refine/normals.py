@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pns_common.grid import rounded_rows
-from pns_common.mesh import Mesh
 from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.rows import cross, dot, marked, norm, number_by_first_appearance, unit
+from pns_common.topology import EdgeClass, Topology
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
@@ -253,7 +253,8 @@ def _own(
     shares = own_shares(given, computed)
     if not control.is_empty:
         at_border = np.zeros(len(given), dtype=bool)
-        at_border[corners] = border_vertices(control.mesh)[control.cleaned.vertex_map[faces]]
+        of_vertex = border_vertices(control.mesh.topology())
+        at_border[corners] = of_vertex[control.cleaned.vertex_map[faces]]
         shares[at_border] = _own_shares_at_border(
             given, computed, points, faces, corners, at_border
         )
@@ -301,10 +302,11 @@ def _own_shares_at_border(
     return np.min(shares, axis=0)
 
 
-def border_vertices(mesh: Mesh) -> Bool[np.ndarray, " V"]:
-    """Return the vertices of edges that are not interior."""
-    topology = mesh.topology()
-    return marked(topology.edges[topology.sharp_edges].reshape(-1), topology.vertex_count)
+def border_vertices(topology: Topology) -> Bool[np.ndarray, " V"]:
+    """Return the vertices of edges that do not lie between two faces."""
+    kind = topology.edge_class
+    rim = (kind != EdgeClass.INTERIOR) & (kind != EdgeClass.CREASE)
+    return marked(topology.edges[rim].reshape(-1), topology.vertex_count)
 
 
 @dataclass(frozen=True, eq=False)

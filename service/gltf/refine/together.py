@@ -273,7 +273,8 @@ def _divided(
         for place, keep in enumerate(control.kept)
     ]
     lengths = [report["reference_length"] for report in made.reports]
-    misses = near_misses(control.mesh, lengths, parts.of_row[control.vertex_rows()])
+    of_vertex = parts.of_row[control.vertex_rows()]
+    misses = near_misses(control.mesh.vertices, control.mesh.topology(), lengths, of_vertex)
     return [
         Part(
             refined=refined[part],

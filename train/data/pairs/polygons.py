@@ -63,12 +63,12 @@ def polygon_stream(seed: int) -> Iterator[Pair]:
         grid_pair: 0.12,
         cage_pair: 0.08,
         partial(sphere_pair, coarsen=remeshed): 0.04,
-        faceted_pair: 0.06,
-        lathe_pair: 0.12,
+        faceted_pair: 0.08,
+        lathe_pair: 0.30,
     }
     several = {
         partial(machined_pairs, coarsen=remeshed): 0.14,
-        partial(solid_pairs, coarsen=remeshed): 0.40,
+        partial(solid_pairs, coarsen=remeshed): 0.20,
     }
     rng = np.random.default_rng(seed)
     for pair in drawn_pairs(rng, singles, several):
