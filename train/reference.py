@@ -166,9 +166,9 @@ def edge_frames(edges: EdgeReading, *, first_face: bool) -> Frames:
 def edge_extents(edges: EdgeReading) -> Float[Tensor, " E"]:
     """Return ℓ: the length of each edge, or the mean altitude over it if that is less."""
     along = edges.b - edges.a
-    areas = [torch.linalg.cross(along, side - edges.a) for side in (edges.c, edges.d)]
     length = root(dot(along, along))
-    return torch.minimum(length, ratio(sum(root(dot(area, area)) for area in areas), 2 * length))
+    c, d = (torch.linalg.cross(along, side - edges.a) for side in (edges.c, edges.d))
+    return torch.minimum(length, ratio(root(dot(c, c)) + root(dot(d, d)), 2 * length))
 
 
 def paper_5(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float[Tensor, "E 5"]:
