@@ -278,10 +278,12 @@ def test_a_job_that_cannot_be_taken_over_keeps_no_other_from_it(
         raise SystemExit
 
     monkeypatch.setattr("service.http.jobs.shared.LEASE_SECONDS", 0.04)
-    monkeypatch.setattr(SharedJobs, "_adopt", adopt)
+    shared = SharedJobs(cast("JobStore", None), dict, print)
+    # Of this one alone: replicas of other tests are still at work.
+    monkeypatch.setattr(shared, "_adopt", adopt)
     service: Any = SimpleNamespace(admission=SimpleNamespace(draining=False))
     with pytest.raises(SystemExit):
-        asyncio.run(SharedJobs(cast("JobStore", None), dict, print).adopt_for_ever(service))
+        asyncio.run(shared.adopt_for_ever(service))
 
 
 def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:
