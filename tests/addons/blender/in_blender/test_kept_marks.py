@@ -80,8 +80,8 @@ def test_edges_marked_sharp_are_kept_where_the_mesh_is_shaded_smooth(flat, left)
     for edge in obj.data.edges:
         edge.use_edge_sharp = all(v // 7 == 3 for v in edge.vertices)
     made = refined(obj, levels=1).data.attributes.get("crease_edge")
-    # Sharp for two levels, of which one is left: 10 c² = 1.
-    kept = 0 if made is None else np.isclose(numbers(made.data, "value"), math.sqrt(0.1)).sum()
+    # Sharp for six levels, of which five are left: 10 c² = 5.
+    kept = 0 if made is None else np.isclose(numbers(made.data, "value"), math.sqrt(0.5)).sum()
     assert kept == left
 
 
