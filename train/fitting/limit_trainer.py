@@ -41,7 +41,7 @@ def fit_to_limit(
         weights = [each for each in networks.parameters() if each.requires_grad]
         optimiser = torch.optim.Adam(weights, lr=recipe.learning_rate)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimiser, recipe.learning_rate, total_steps=max(recipe.steps, 1), pct_start=WARM_UP
+            optimiser, recipe.learning_rate, total_steps=recipe.steps, pct_start=WARM_UP
         )
         losses: list[float] = []
         for batch, reference in batches(recipe, plan):
