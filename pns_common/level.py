@@ -115,10 +115,10 @@ class Level:
 
     @cached_property
     def face_bends(self) -> Float[np.ndarray, " F"]:
-        """Mean of x over the edges of each face; less of a soft edge, by its sharpness."""
+        """Mean of (1 − w)² x over the edges of each face, w their sharpness."""
         mesh, jumps = self.topology, self.edges.jumps
         if len(mesh.soft):
-            jumps = jumps * (1 - mesh.soft)
+            jumps = jumps * (1 - mesh.soft) ** 2
         bends = np.empty(mesh.face_count)
         if not mesh.triangles:
             sums = np.add.reduceat(jumps[mesh.corner_edges], mesh.offsets[:-1])

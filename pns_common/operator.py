@@ -18,16 +18,16 @@ The default's rule, models of format 4, acts at the control mesh alone:
     ℓ          h, or less where that is long and thin: at an edge at most the mean altitude of what
                lies across it, at a face its shortest side
     γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
-               x = 1 − n1 · n2, b the smaller mean of x over the edges of both faces;
-               tanh(c_v x_v) elsewhere, x_v the mean of x over the ring's or the face's edges
+               x = 1 − n1 · n2, b the smaller mean of (1 − w)² x over the edges of both
+               faces; tanh(c_v b) at a face's vertex, b its own mean; tanh(c_v x_v) at an old
+               vertex, x_v the mean of x over its ring
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
 C is the budget, R the mesh's unit of length, τ the share of ℓ that the network may ask for. On a
 boundary or a crease there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it
-still meet there. Sharpness in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an edge,
-(1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex, and (1 − w̄) δ at a face's vertex, w̄
-the mean over the face's edges.
+still meet there. Sharpness w in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an
+edge, and (1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex.
 """
 
 from __future__ import annotations
@@ -301,7 +301,7 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     mesh, count, edges = level.topology, len(rows), level.edges
     made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
     of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
-    of_edges = edges.lengths, edges.jumps, edges.bends, mesh.sharpness
+    of_edges = edges.lengths, edges.jumps, edges.bends
     frames.measure_face_vertices(
         level.points, level.rings.fields, *of_faces, *of_edges, rows, 0, count, made
     )
@@ -313,7 +313,7 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         gate=np.tanh(rule.vertex_gate_sharpness * level.face_bends[rows]),
         bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * made[:, frames.EXTENT],
-        weight=made[:, frames.SMOOTH],
+        weight=np.ones(count),
         degenerate=np.zeros(count, dtype=bool),
     )
 

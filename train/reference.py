@@ -100,8 +100,8 @@ class Surroundings:
 
     @cached_property
     def gentler_bend(self) -> Float[Tensor, " E"]:
-        """The smaller mean of x over the edges of an edge's two faces."""
-        jumps = (1 - self.mesh.sharpness) * self.turns[0][::2, 0]
+        """The smaller mean of (1 − w)² x over the edges of an edge's two faces."""
+        jumps = (1 - self.mesh.sharpness) ** 2 * self.turns[0][::2, 0]
         bends = jumps[self.mesh.face_edges].mean(dim=1)
         return bends[self.mesh.half_edges // 3].min(dim=1).values
 

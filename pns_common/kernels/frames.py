@@ -248,8 +248,8 @@ def polygon_frames_and_features(
 
 # --- face vertices --------------------------------------------------------------------------------
 
-# Columns of a face's measures: its normal, h², ℓ, the mean of 1 − w over its edges, and face-8.
-NORMAL, SQUARE, EXTENT, SMOOTH, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 6, 14
+# Columns of a face's measures: its normal, h², ℓ, and face-8.
+NORMAL, SQUARE, EXTENT, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 13
 
 
 @kernel
@@ -262,7 +262,6 @@ def measure_face_vertices(
     lengths,
     jumps,
     bends,
-    sharpness,
     rows,
     begin,
     end,
@@ -274,8 +273,8 @@ def measure_face_vertices(
     scaled to length 1 where that is above CLEAR_NORMAL.
 
     Args:
-        lengths, jumps, bends, sharpness: (E,) of the edges: h, x, signed sine, w.
-        measures: (N, 14) out.
+        lengths, jumps, bends: (E,) of the edges: h, x, signed sine.
+        measures: (N, 13) out.
     """
     for i in range(begin, end):
         f, to = rows[i], i - begin
@@ -287,7 +286,7 @@ def measure_face_vertices(
             centre = centre[0] + p[0] / count, centre[1] + p[1] / count, centre[2] + p[2] / count
         mean, area = (0.0, 0.0, 0.0), 0.0
         square, length, shortest, longest = 0.0, 0.0, math.inf, 0.0
-        jump, bend, smooth, least, most = 0.0, 0.0, 0.0, math.inf, -math.inf
+        jump, bend, least, most = 0.0, 0.0, math.inf, -math.inf
         height, lowest, highest = 0.0, math.inf, -math.inf
         for h in range(first, stop):
             after = h + 1 if h + 1 < stop else first
@@ -301,7 +300,6 @@ def measure_face_vertices(
             shortest, longest = min(shortest, lengths[e]), max(longest, lengths[e])
             jump += jumps[e] / count
             bend += bends[e] / count
-            smooth += (1 - sharpness[e]) / count
             least, most = min(least, bends[e]), max(most, bends[e])
             height += umbrella / count
             lowest, highest = min(lowest, umbrella), max(highest, umbrella)
@@ -313,7 +311,7 @@ def measure_face_vertices(
             unevenness += over_plane * over_plane / count
         for k in range(3):
             measures[to, NORMAL + k] = normal[k]
-        measures[to, SQUARE], measures[to, EXTENT], measures[to, SMOOTH] = square, shortest, smooth
+        measures[to, SQUARE], measures[to, EXTENT] = square, shortest
         measures[to, FACE_FEATURES] = jump
         measures[to, FACE_FEATURES + 1] = bend
         measures[to, FACE_FEATURES + 2] = (most + least) / 2

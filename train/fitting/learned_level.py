@@ -160,7 +160,7 @@ class LearnedLevel:
         length = between[:, 1] - between[:, 0]
         middle = shortened(along[self.edges].mean(dim=1), n["budget"] * dot(length, length))
         w = sharp.edge
-        bends, smooth = self.face_means(self.jumps * (1 - w)), self.face_means(1 - w)
+        bends = self.face_means(self.jumps * (1 - w) ** 2)
         smoothed = bends[self.sides].amin(dim=1)
         opened = torch.where(self.degenerate, 0.0, torch.tanh(n["vertex_gate"] * smoothed))
         own = self.at_edges.gate
@@ -168,7 +168,7 @@ class LearnedLevel:
         edges = self.at_edges.corrected(networks.edge, prior[count : count + len(w)], gate)
         made = [vertices + curved * on_curve, edges + w[:, None] * middle]
         if networks.face is not None:
-            gate = smooth * torch.tanh(n["vertex_gate"] * bends)
+            gate = torch.tanh(n["vertex_gate"] * bends)
             made += [self.at_faces.corrected(networks.face, prior[count + len(w) :], gate)]
         return torch.cat(made)
 
