@@ -249,22 +249,14 @@ def face_gates(level: Level, rule: Rule) -> Float[np.ndarray, " F"]:
 
     A flat face whose sides are sharp all around is shut, however it is cut into triangles.
     """
-    mesh, jumps = level.topology, level.edges.jumps
-    of_edges, made = np.empty(len(jumps)), np.empty(mesh.face_count)
-
-    def at_edges(begin: int, end: int) -> None:
-        np.tanh(rule.vertex_gate_sharpness * jumps[begin:end], out=of_edges[begin:end])
-        if len(mesh.soft):
-            of_edges[begin:end] *= 1 - mesh.soft[begin:end]
-
-    def at_faces(begin: int, end: int) -> None:
-        of_edges[mesh.face_edges[begin:end]].max(axis=1, out=made[begin:end])
-
-    level.blocks.run(len(jumps), at_edges)
-    if not mesh.triangles:
-        return np.maximum.reduceat(of_edges[mesh.corner_edges], mesh.offsets[:-1])
-    level.blocks.run(len(made), at_faces)
-    return made
+    mesh = level.topology
+    of_edges = np.tanh(rule.vertex_gate_sharpness * level.edges.jumps)
+    if len(mesh.soft):
+        of_edges *= 1 - mesh.soft
+    if mesh.triangles:
+        first, second, third = of_edges[mesh.face_edges].T
+        return np.maximum(np.maximum(first, second), third)
+    return np.maximum.reduceat(of_edges[mesh.corner_edges], mesh.offsets[:-1])
 
 
 def edge_inputs(

@@ -70,12 +70,15 @@ def main(context: typer.Context) -> None:
 @app.command()
 def train(
     recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
-    seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Of weights and batches; the recipe's own if not given."),
+    ] = None,
     output: Output = None,
 ) -> None:
     """Train a recipe, write its checkpoint and print the held-out table."""
     console = Console()
-    chosen = RECIPES[recipe](seed)
+    chosen = RECIPES[recipe]() if seed is None else RECIPES[recipe](seed)
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     with _errors_told(console):
         prepare_output(path)

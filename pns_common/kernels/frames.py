@@ -48,10 +48,9 @@ def edge_frame(n, m, spoke):
 
 
 @inlined
-def _extent(p, q, c, d):
-    """Return the length of an edge from p to q, or the mean altitude of c and d over it if less."""
+def _extent(h, p, q, c, d):
+    """Return h = ‖q − p‖, or the mean altitude of c and d over the edge from p to q if less."""
     spoke = difference(q, p)
-    h = root(dot(spoke, spoke))
     twice = norm(cross(spoke, difference(c, p))) + norm(cross(spoke, difference(d, p)))
     return min(h, twice / (2 * h)) if h > 0 else 0.0
 
@@ -121,7 +120,7 @@ def frames_and_features(
         if len(opened):
             sides[to] = 0.0 if fallback else min(opened[h1 // 3], opened[h2 // 3])
         p, q = row(points, a), row(points, b)
-        extent[to] = _extent(p, q, row(points, c), row(points, d))
+        extent[to] = _extent(lengths[e], p, q, row(points, c), row(points, d))
         features[to, 0] = x
         features[to, LOGS] = logs[ac] - logs[e]
         features[to, LOGS + 1] = logs[bc] - logs[e]
@@ -233,7 +232,7 @@ def polygon_frames_and_features(
         c = wing(points, h1, corners, offsets, face_of_corner)
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)
-        extent[to] = _extent(p, q, c[:3], d[:3])
+        extent[to] = _extent(lengths[e], p, q, c[:3], d[:3])
         features[to, 0] = x
         features[to, LOGS] = _log_ratio(c, p, logs[e])
         features[to, LOGS + 1] = _log_ratio(c, q, logs[e])
