@@ -17,10 +17,10 @@ The default's rule, models of format 4, acts at the control mesh alone:
     h          the edge's length; elsewhere the root mean square of the ring's or face's edges
     ℓ          h, or less where that is long and thin: at an edge at most the mean altitude of what
                lies across it, at a face its shortest side
-    γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
-               x = 1 − n1 · n2, b the smaller mean of (1 − w)² x over the edges of both
-               faces; tanh(c_v b) at a face's vertex, b its own mean; tanh(c_v x_v) at an old
-               vertex, x_v the mean of x over its ring
+    γ          the gate, 0 on planes: γ₂ + (1 − γ₂) γ_f at edges, γ₂ = tanh(c x²), x = 1 − n1 · n2,
+               γ_f of the face that is less open; γ_f at a face's vertex: the largest
+               (1 − w) tanh(c_v x) over its edges; tanh(c_v x_v) at an old vertex, x_v the mean
+               of x over its ring
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
@@ -156,7 +156,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     count, edges = len(level.points), mesh.interior
     x = base.place(level.points, mesh, level.blocks)  # x0
     has_prior = rule.prior_strength is not None
-    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL, bends=has_prior)
+    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL)
     if not has_prior:
         made = _Rows.starting_with(np.zeros((len(x), 3)))
 
@@ -171,7 +171,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         x += made.displacement
         return Additions(x, base_points, *made.arrays, None, degenerate, None)
 
-    curves = find_curves(level.points, mesh, len(x))
+    curves, opened = find_curves(level.points, mesh, len(x)), face_gates(level, rule)
     vertices, faces = np.flatnonzero(level.ringed), np.arange(len(x) - count - len(mesh.edges))
     delta, along = prior(level, rule, curves)  # D, to become δ
     made = _Rows.starting_with(delta)
@@ -181,12 +181,12 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         made.correct(at, answers(rule.vertex_network, at), first=0)
 
     def at_edges(begin: int, end: int) -> int:
-        at = edge_inputs(level, rule, edges[begin:end])
+        at = edge_inputs(level, rule, edges[begin:end], opened)
         made.correct(at, answers(rule.edge_network, at), first=count)
         return int(at.degenerate.sum())
 
     def at_faces(begin: int, end: int) -> None:
-        at = face_inputs(level, rule, faces[begin:end])
+        at = face_inputs(level, rule, faces[begin:end], opened)
         made.correct(at, answers(rule.face_network, at, 1), first=count + len(mesh.edges))
 
     blocks.run(len(vertices), at_vertices)
@@ -244,16 +244,51 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     return made
 
 
-def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
-    """Return what surrounds the network at interior edges."""
+def face_gates(level: Level, rule: Rule) -> Float[np.ndarray, " F"]:
+    """Return how open each face is: the largest (1 − w) tanh(c_v x) over its edges.
+
+    A flat face whose sides are sharp all around is shut, however it is cut into triangles.
+    """
+    mesh, jumps = level.topology, level.edges.jumps
+    of_edges, made = np.empty(len(jumps)), np.empty(mesh.face_count)
+
+    def at_edges(begin: int, end: int) -> None:
+        np.tanh(rule.vertex_gate_sharpness * jumps[begin:end], out=of_edges[begin:end])
+        if len(mesh.soft):
+            of_edges[begin:end] *= 1 - mesh.soft[begin:end]
+
+    def at_faces(begin: int, end: int) -> None:
+        of_edges[mesh.face_edges[begin:end]].max(axis=1, out=made[begin:end])
+
+    level.blocks.run(len(jumps), at_edges)
+    if not mesh.triangles:
+        return np.maximum.reduceat(of_edges[mesh.corner_edges], mesh.offsets[:-1])
+    level.blocks.run(len(made), at_faces)
+    return made
+
+
+def edge_inputs(
+    level: Level,
+    rule: Rule,
+    rows: Integer[np.ndarray, " N"],
+    opened: Float[np.ndarray, " F"] | None = None,
+) -> Inputs:
+    """Return what surrounds the network at interior edges.
+
+    Args:
+        level, rule: what they belong to.
+        rows: the edges.
+        opened: `face_gates`, if they are known already.
+    """
     mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
     basis = np.empty((count, 9))
     features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
     (curvature, sides, length, extent), degenerate = np.empty((4, count)), np.empty(count, bool)
     has_prior = rule.prior_strength is not None
     fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
-    bends = level.face_bends if has_prior else level.logs[:0]
-    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
+    if opened is None:
+        opened = face_gates(level, rule) if has_prior else level.logs[:0]
+    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, opened
     to = basis, curvature, sides, length, extent, degenerate, features
     if mesh.triangles:
         of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
@@ -264,7 +299,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.
-        gate += (1 - gate) * np.tanh(rule.vertex_gate_sharpness * sides)
+        gate += (1 - gate) * sides
     return Inputs(
         rows,
         features,
@@ -296,8 +331,13 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
     )
 
 
-def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
-    """Return what surrounds the network at faces; z is the length along the normal."""
+def face_inputs(
+    level: Level,
+    rule: Rule,
+    rows: Integer[np.ndarray, " N"],
+    opened: Float[np.ndarray, " F"] | None = None,
+) -> Inputs:
+    """Return what surrounds the network at faces, likewise; z is the length along the normal."""
     mesh, count, edges = level.topology, len(rows), level.edges
     made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
     of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
@@ -310,7 +350,7 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         rows,
         made[:, frames.FACE_FEATURES :].astype(rule.feature_type),
         basis,
-        gate=np.tanh(rule.vertex_gate_sharpness * level.face_bends[rows]),
+        gate=(face_gates(level, rule) if opened is None else opened)[rows],
         bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * made[:, frames.EXTENT],
         weight=np.ones(count),

@@ -98,12 +98,11 @@ class Surroundings:
         jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
         return jump, bend
 
-    @cached_property
-    def gentler_bend(self) -> Float[Tensor, " E"]:
-        """The smaller mean of (1 − w)² x over the edges of an edge's two faces."""
-        jumps = (1 - self.mesh.sharpness) ** 2 * self.turns[0][::2, 0]
-        bends = jumps[self.mesh.face_edges].mean(dim=1)
-        return bends[self.mesh.half_edges // 3].min(dim=1).values
+    def gates_beside(self, gate_sharpness: float) -> Float[Tensor, " E"]:
+        """Return the smaller gate of an edge's two faces: the largest (1 − w) tanh(c_v x)."""
+        gates = (1 - self.mesh.sharpness) * torch.tanh(gate_sharpness * self.turns[0][::2, 0])
+        of_faces = gates[self.mesh.face_edges].max(dim=1).values
+        return of_faces[self.mesh.half_edges // 3].min(dim=1).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +340,7 @@ class GeneralRule:
         interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
         ringed = mesh.ringed & (blend < 1)
         own = torch.tanh(self.gate_sharpness * frames.curvature**2)
-        opened = torch.tanh(self.vertex_gate_sharpness * around.gentler_bend)
+        opened = around.gates_beside(self.vertex_gate_sharpness)
         opened = torch.where(frames.degenerate, 0.0, opened)
         edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
         z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)

@@ -63,7 +63,7 @@ def frames_and_features(
     fields,
     lengths,
     logs,
-    bends,
+    opened,
     corners,
     edges,
     corner_edges,
@@ -85,12 +85,12 @@ def frames_and_features(
     Args:
         fields: (V, 4) mean normals and umbrella heights; read by signed features alone.
         lengths, logs: (E,) lengths and their logarithms.
-        bends: (F,) mean x over the edges of each face; (0,) where it is not wanted.
+        opened: (F,) gates of the faces; (0,) where they are not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
-        sides: (N,) out: the smaller bend of both faces, 0 where there is no frame.
+        sides: (N,) out: the smaller gate of both faces, 0 where there is no frame.
         length: (N,) out: h.
         extent: (N,) out: ℓ.
         degenerate: (N,) out: whether the frame is the fallback.
@@ -118,8 +118,8 @@ def frames_and_features(
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(bends):
-            sides[to] = 0.0 if fallback else min(bends[h1 // 3], bends[h2 // 3])
+        if len(opened):
+            sides[to] = 0.0 if fallback else min(opened[h1 // 3], opened[h2 // 3])
         p, q = row(points, a), row(points, b)
         extent[to] = _extent(p, q, row(points, c), row(points, d))
         features[to, 0] = x
@@ -191,7 +191,7 @@ def polygon_frames_and_features(
     fields,
     lengths,
     logs,
-    bends,
+    opened,
     corners,
     offsets,
     face_of_corner,
@@ -228,8 +228,8 @@ def polygon_frames_and_features(
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(bends):
-            sides[to] = 0.0 if fallback else min(bends[f], bends[g])
+        if len(opened):
+            sides[to] = 0.0 if fallback else min(opened[f], opened[g])
         c = wing(points, h1, corners, offsets, face_of_corner)
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)
