@@ -118,4 +118,5 @@ def test_meshes_of_ones_own_validate(tmp_path):
     ends = shapes["box.obj"].sharp
     assert np.isclose(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum(), 12)
     coarse = coarse_mesh(shapes["ball.ply"], drawn[0])
-    assert coarse is not None and len(coarse.faces) <= 640
+    assert coarse is not None
+    assert len(coarse.faces) <= 640
