@@ -1,8 +1,9 @@
 """The operator once more, in torch: gradients through positions, and an oracle for the kernels.
 
-Written from the paper and from the derivations behind docs/theorems.md, not from `pns_common`: it
-finds edges by itself, sums in any order, and runs at a thousandth of the kernels' speed. All is
-float64. Symbols are those of docs/features.md; a, b, c, d are an edge's ends and opposite vertices.
+Written from the paper and from the derivations behind docs/explanation/guarantees.md, not from
+`pns_common`: it finds edges by itself, sums in any order, and runs at a thousandth of the kernels'
+speed. All is float64. Symbols are those of docs/reference/features.md; a, b, c, d are an edge's
+ends and opposite vertices.
 
     format 1    q  = q0 + h² γ (C / R) F Π₁ η(φ)
     format 4    x' = x0 + s γ Π_ρ(D + τ ℓ F z(φ)),    ρ = C h² / R,    x0 = S_w p
