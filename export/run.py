@@ -37,7 +37,7 @@ FILE_OF_RECIPE = {
 
 def bundled_file(recipe: Recipe) -> Path | None:
     """Return where a recipe's bundled model lies; None for recipes and seeds without one."""
-    bundled = recipe.name in FILE_OF_RECIPE and recipe == RECIPES[recipe.name]()
+    bundled = recipe.name in FILE_OF_RECIPE and recipe == RECIPES[recipe.name](0)
     return FILE_OF_RECIPE[recipe.name] if bundled else None
 
 

@@ -70,16 +70,13 @@ def main(context: typer.Context) -> None:
 @app.command()
 def train(
     recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
-    seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Of weights and batches; the recipe's own if not given."),
-    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
     steps: Annotated[int | None, typer.Option(min=1, help="In place of the recipe's.")] = None,
     output: Output = None,
 ) -> None:
     """Train a recipe, write its checkpoint and print the held-out table."""
     console = Console()
-    chosen = RECIPES[recipe]() if seed is None else RECIPES[recipe](seed)
+    chosen = RECIPES[recipe](seed)
     chosen = chosen if steps is None else of_length(chosen, steps)
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     with _errors_told(console):
