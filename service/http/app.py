@@ -16,23 +16,23 @@ from starlette.types import ASGIApp
 from ..settings import Settings
 from ..workers import jobs
 from ..workers.budget import FacesBudget
-from ..workers.catalogue import Catalogue
 from ..workers.costs import Cost
 from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
+from ..workers.models import Catalogue
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import layers, openapi, pages, problems, result_room, routes
+from . import layers, openapi, pages, problems, routes
 from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
-from .catalogue import ReadOnce
 from .jobs import routes as job_routes
 from .jobs import work as job_work
 from .jobs.book import JobBook
 from .jobs.shared import SharedJobs
 from .jobs.store import JobStore
-from .service import Service
+from .room import with_results_that_fit
+from .service import ReadOnce, Service
 from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 
@@ -60,7 +60,7 @@ def create_app(
     work. Raises KeysError where the file of keys cannot be used, TracingError where traces cannot
     be sent.
     """
-    settings = result_room.fitting(settings or Settings())
+    settings = with_results_that_fit(settings or Settings())
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
     workers = {

@@ -12,10 +12,10 @@ from pathlib import Path
 from fastapi import Request
 
 from ..bodies import media
-from ..bodies.encodings import encoding_of
+from ..bodies.media import encoding_of
 from ..errors import InvalidParameter, check_limit
+from ..log_lines import REQUEST_ID
 from ..options import Options
-from ..request_ids import REQUEST_ID
 from ..settings import Settings
 from ..workers.job import Job
 from ..workers.jobs import Work

@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ..bodies.encodings import IDENTITY, decoded
-from ..bodies.media import Kind
+from ..bodies.media import IDENTITY, Kind, decoded
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
 from ..memory_cap import memory_cap
@@ -27,7 +26,7 @@ from .progress import Reporter
 if TYPE_CHECKING:
     from pns_common.model.session import Model
 
-    from .catalogue import Catalogue
+    from .models import Catalogue
 
 log = logging.getLogger("pns.service")
 
@@ -198,6 +197,6 @@ def hold_model(model: Model | str | None, providers: Sequence[str] | None = None
 
 def catalogue() -> Catalogue:
     """Return what this worker's models say of themselves."""
-    from .catalogue import catalogue_of
+    from .models import catalogue_of
 
     return catalogue_of(_MODELS)

@@ -24,17 +24,21 @@ from ...report import Change
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
-from .attributes import RefinedPrimitive, opposed_normals, refined_primitives
+from .attributes import RefinedPrimitive, refined_primitives
+from .changes import (
+    changes_of_primitive,
+    changes_of_vertices,
+    near_miss_changes,
+    near_misses,
+    opposed_normals,
+)
 from .control_mesh import ControlMesh, control_mesh
 from .level_one import refined_polygons
 from .mesh_refine import (
-    changes_of_primitive,
-    changes_of_vertices,
     creases_of,
     refined_mesh,
     sharp_after,
 )
-from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
 from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces

@@ -29,17 +29,15 @@ from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .attributes import Columns, RefinedPrimitive, refined_primitives
+from .changes import changes_of_primitive, changes_of_vertices, near_miss_changes, near_misses
 from .columns import COLUMNS, skin_sets
 from .control_mesh import ControlMesh, Parts, control_mesh, slices
 from .mesh_refine import (
     RefinedMesh,
-    changes_of_primitive,
-    changes_of_vertices,
     creases_of,
     refined_union,
     sharp_after,
 )
-from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
 

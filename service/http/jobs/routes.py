@@ -14,8 +14,7 @@ from ...bodies import media
 from ...errors import ServiceError
 from ...workers.job import State
 from .. import documentation, problems
-from ..answer import FileAnswer
-from ..answer_headers import answer_type, server_timing
+from ..answer import FileAnswer, answer_type, server_timing
 from ..clients import client_of
 from ..parameters import Parameters
 from ..service import Service

@@ -15,7 +15,7 @@ from ...workers.job import Job, State
 from ...workers.memory_file import MemoryFile
 from .. import problems
 from ..intake import Asked, Wanted, asked_of, made_of
-from ..result_room import result_folder
+from ..room import result_folder
 from .book import Entry, NoSuchJobError
 from .store import (
     ANSWER,

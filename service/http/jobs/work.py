@@ -16,11 +16,11 @@ from ...workers.job import Job, State
 from ...workers.worker import JobFaultError
 from .. import problems
 from ..admission import DrainingError
+from ..answer import unless_gone
 from ..clients import client_of
 from ..intake import Wanted, owner_of, taken_in
-from ..leaving import unless_gone
 from ..parameters import Parameters
-from ..result_room import result_folder
+from ..room import result_folder
 from ..service import Service
 from .book import Entry
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ...request_ids import HEADER, REQUEST_ID, id_of
+from ...log_lines import HEADER, REQUEST_ID, id_of
 from ..clients import Client
 
 log = logging.getLogger("pns.request")

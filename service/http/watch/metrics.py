@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import platform
+import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
 from prometheus_client import (
+    CONTENT_TYPE_LATEST,
     CollectorRegistry,
     Counter,
     Gauge,
@@ -18,15 +20,20 @@ from prometheus_client import (
     Info,
     PlatformCollector,
     ProcessCollector,
+    generate_latest,
 )
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+from starlette.responses import PlainTextResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ...workers.catalogue import Catalogue
+from ...workers.models import Catalogue
 from .journal import Entry
 
 # From a small mesh to the longest job.
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 600)
+# A text is made for a second, however often it is asked for.
+FRESH_SECONDS = 1.0
 
 
 class Metrics:
@@ -150,3 +157,21 @@ def _resident(pid: int) -> int:
     except OSError:
         return 0
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+def scrapes(registry: CollectorRegistry, clock: Callable[[], float] = time.monotonic) -> ASGIApp:
+    """Return an application that answers GET /metrics with the state of a registry."""
+    text, made = b"", float("-inf")
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        nonlocal text, made
+        if scope["path"] != "/metrics" or scope["method"] not in ("GET", "HEAD"):
+            answer: Response = PlainTextResponse("GET /metrics", 404)
+        else:
+            # Nothing is awaited: of many scrapes at once the first makes the text.
+            if clock() - made >= FRESH_SECONDS:
+                text, made = generate_latest(registry), clock()
+            answer = Response(text, media_type=CONTENT_TYPE_LATEST)
+        await answer(scope, receive, send)
+
+    return app

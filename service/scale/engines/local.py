@@ -15,10 +15,9 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ...errors import WorkerDied
-from ...workers.ending import end_with_parent, no_interrupt
-from . import chunks
-from .chunks import Done
-from .work import Engine, R, T, Work
+from ...workers.worker import end_with_parent, no_interrupt
+from . import work as chunks
+from .work import Done, Engine, R, T, Work
 
 if TYPE_CHECKING:
     from pebble import ProcessPool

@@ -17,10 +17,10 @@ from fastapi.testclient import TestClient
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.http.admission import Admission
 from service.http.app import create_app
-from service.http.catalogue import ReadOnce
+from service.http.service import ReadOnce
 from service.meshfiles.example import part_glb
 from service.settings import Settings
-from service.workers.catalogue import Catalogue
+from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 from tests.support.networks import DEFAULT_CARD

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from service.http import result_room
+from service.http import room
 from service.http.clients import Client
-from service.http.limits import limits_of
+from service.http.routes import limits_of
 from service.settings import Settings, StartError
 
 Usage = namedtuple("Usage", "total used free")
@@ -32,7 +32,7 @@ def test_results_take_no_more_than_leaves_room_for_those_that_are_made(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     asked = on_a_disk(monkeypatch, 1000)
-    settings = result_room.fitting(Settings(result_bytes=900, result_folder=tmp_path))
+    settings = room.with_results_that_fit(Settings(result_bytes=900, result_folder=tmp_path))
     assert asked == [tmp_path]
     assert limits_of(settings, Client("", None)).result_bytes == 750
     assert "750, in place of the 900 of PNS_RESULT_BYTES" in caplog.text
@@ -43,9 +43,9 @@ def test_where_there_is_room_or_no_word_of_it_nothing_changes(
 ) -> None:
     on_a_disk(monkeypatch, 1000)
     settings = Settings(result_bytes=750)
-    assert result_room.fitting(settings) is settings
+    assert room.with_results_that_fit(settings) is settings
     monkeypatch.setattr(shutil, "disk_usage", none)
-    assert result_room.fitting(settings) is settings
+    assert room.with_results_that_fit(settings) is settings
     assert caplog.messages == []
 
 
@@ -60,7 +60,7 @@ def test_a_folder_that_cannot_be_written_is_refused_at_start(
     monkeypatch.setattr(os, "access", lambda path, _: path != closed)
     for folder in (tmp_path / "missing", file, closed):
         with pytest.raises(StartError, match=str(folder)):
-            result_room.fitting(Settings(result_folder=folder))
-    monkeypatch.setattr(result_room, "gettempdir", none)
+            room.with_results_that_fit(Settings(result_folder=folder))
+    monkeypatch.setattr(room, "gettempdir", none)
     with pytest.raises(StartError, match="nowhere: there is none"):
-        result_room.fitting(Settings())
+        room.with_results_that_fit(Settings())

@@ -17,13 +17,11 @@ from prometheus_client import CollectorRegistry, Gauge
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
-from service.http.prompt_server import PromptServer
-from service.http.watch.metrics import Metrics
-from service.http.watch.scrapes import scrapes
-from service.log_lines import LONGEST, JsonLines, TerminalLines
-from service.request_ids import REQUEST_ID
+from service.http.server import PromptServer
+from service.http.watch.metrics import Metrics, scrapes
+from service.log_lines import LONGEST, REQUEST_ID, JsonLines, TerminalLines
 from service.settings import Settings
-from service.workers.catalogue import Catalogue
+from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 

@@ -11,7 +11,8 @@ import pytest
 from pebble.pool.process import TaskManager
 
 from service.errors import InvalidParameter, WorkerDied
-from service.scale.engines import chunks, local, on_ray
+from service.scale.engines import local, on_ray
+from service.scale.engines import work as chunks
 from service.scale.engines.work import Work
 from tests.service.scale.jobs import (
     Numbered,
