@@ -148,7 +148,7 @@ def create_app(
         )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
-    app.openapi = openapi.Description(app)  # type: ignore[method-assign]
+    app.openapi = openapi.described(app.openapi)  # type: ignore[method-assign]
     app.include_router(pages.router(settings.prefix))
     return app
 

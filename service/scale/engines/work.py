@@ -16,6 +16,8 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from ...errors import JobTimeout, ServiceError, WorkerDied
 
+# A task that its worker does not survive twice is taken to be the cause.
+MOST_ATTEMPTS = 2
 # What is lost at most where a driver is killed, and how long an idle worker waits at the end.
 SECONDS = 0.5
 MOST = 256
@@ -48,33 +50,30 @@ class Work(Generic[T, R]):
     Attributes:
         job: done in a worker; what it raises is raised by the engine.
         lost: what a task gives whose workers died or hung each time; it may raise too.
-        most_attempts: how often a task is tried.
         seconds: how long one try may take; None: any time.
         prepare: done by a new process on this machine, before the first task's time begins.
     """
 
     job: Callable[[T], R]
     lost: Callable[[T, ServiceError], R]
-    most_attempts: int
     seconds: float | None
     prepare: Callable[[], None] = nothing
 
     def again(self, task: T) -> T | None:
         """Return a task whose worker is lost, to be tried once more; None if tried enough."""
-        if task.attempt >= self.most_attempts:
+        if task.attempt >= MOST_ATTEMPTS:
             return None
         changed: Any = task
         return replace(changed, attempt=task.attempt + 1)
 
     def given_up(self, task: T, *, late: bool) -> R:
         """Return what a task gives whose last worker died, or hung, as far as is known."""
-        times = "twice" if self.most_attempts == 2 else f"{self.most_attempts} times"
         if late:
             return self.lost(
-                task, JobTimeout(f"it ran longer than {self.seconds:g} seconds, {times}")
+                task, JobTimeout(f"it ran longer than {self.seconds:g} seconds, twice")
             )
         longer = "" if self.seconds is None else f", or longer than {self.seconds:g} seconds"
-        text = f"its worker ended, {times}: out of memory, a fault{longer}"
+        text = f"its worker ended, twice: out of memory, a fault{longer}"
         return self.lost(task, WorkerDied(text))
 
 
