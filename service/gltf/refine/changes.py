@@ -1,4 +1,4 @@
-"""What refining changed beside the geometry, and what a viewer may stumble over: report entries."""
+"""Report entries: changes beside the geometry, and what a viewer may stumble over."""
 
 from __future__ import annotations
 

@@ -143,7 +143,8 @@ class SharedJobs:
             await self._fail(record, StoreError("the file is no longer kept: send it again"))
             return True
         settings = service.settings
-        asked = record.asked | {"options": Options(**record.asked["options"])}
+        options = Options(**record.asked["options"])
+        asked: dict[str, Any] = record.asked | {"options": options}
         patience = settings.queue_seconds + settings.job_seconds
         async with AsyncExitStack() as held:
             counted = held.enter_context(service.admission.body(asked["client"]))
