@@ -32,6 +32,18 @@ WAITING, A_TURN = 2048, 32
 HEAD_BYTES = 16 * 1024
 # Connections to the metrics.
 MOST_SCRAPERS = 16
+# Of uvicorn's settings, for the service and for its metrics.
+ALIKE: dict[str, Any] = {
+    # The other parser bounds no head.
+    "http": "h11",
+    "h11_max_incomplete_event_size": HEAD_BYTES,
+    "ws": "none",
+    "server_header": False,
+    # Its loggers are configured with ours, and the journal says what an access log would.
+    "log_config": None,
+    "access_log": False,
+    "timeout_graceful_shutdown": FLUSH_SECONDS,
+}
 
 
 class PromptServer(uvicorn.Server):
@@ -205,18 +217,7 @@ def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | No
     hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
     listening = _listening(host, wanted, hint, f"metrics on {host}:{wanted}: ")
     log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
-    config = uvicorn.Config(
-        scrapes(metrics.registry),
-        http="h11",
-        lifespan="off",
-        ws="none",
-        proxy_headers=False,
-        server_header=False,
-        log_config=None,
-        access_log=False,
-        h11_max_incomplete_event_size=HEAD_BYTES,
-        timeout_graceful_shutdown=FLUSH_SECONDS,
-    )
+    config = uvicorn.Config(scrapes(metrics.registry), lifespan="off", proxy_headers=False, **ALIKE)
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
@@ -226,18 +227,10 @@ def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config
         app,
         host=settings.host,
         port=settings.port,
-        # The other parser bounds no head.
-        http="h11",
-        h11_max_incomplete_event_size=HEAD_BYTES,
-        ws="none",
         proxy_headers=bool(settings.proxies),
         forwarded_allow_ips=[str(network) for network in settings.proxies],
-        server_header=False,
         limit_concurrency=most + BEYOND,
         backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
-        # Its loggers are configured with ours, and the journal says what an access log would.
-        log_config=None,
-        access_log=False,
-        timeout_graceful_shutdown=FLUSH_SECONDS,
+        **ALIKE,
     )

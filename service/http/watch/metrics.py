@@ -8,6 +8,7 @@ import platform
 import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -41,47 +42,23 @@ class Metrics:
 
     def __init__(self) -> None:
         own = self.registry = CollectorRegistry()
-        self._requests = Counter(
-            "pns_requests",
-            "Requests that have ended",
-            ["route", "method", "status", "code"],
-            registry=own,
+        counter, histogram = (partial(kind, registry=own) for kind in (Counter, Histogram))
+        self._requests = counter(
+            "pns_requests", "Requests that have ended", ["route", "method", "status", "code"]
         )
-        self._request_seconds = Histogram(
-            "pns_request_seconds",
-            "Seconds from a request's head to the end of its answer",
-            ["route"],
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._received = Counter("pns_received_bytes", "Bytes of bodies", ["route"], registry=own)
-        self._sent = Counter("pns_sent_bytes", "Bytes of answers", ["route"], registry=own)
-        self._stage_seconds = Histogram(
-            "pns_stage_seconds",
-            "Seconds of a job by stage",
-            ["stage"],
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._queue_seconds = Histogram(
-            "pns_queue_seconds",
-            "Seconds that a job waited",
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._faces = Counter(
-            "pns_faces", "Faces that came in and went out", ["direction"], registry=own
-        )
-        self._build = Info("pns_build", "What runs", registry=own)
-        self._build.info(
-            {"version": version("pns-subdivision"), "python": platform.python_version()}
-        )
-        self._model = Gauge(
-            "pns_model_info",
-            "The models that are served",
-            ["name", "hash", "default"],
-            registry=own,
-        )
+        text = "Seconds from a request's head to the end of its answer"
+        self._request_seconds = histogram("pns_request_seconds", text, ["route"], buckets=SECONDS)
+        self._received = counter("pns_received_bytes", "Bytes of bodies", ["route"])
+        self._sent = counter("pns_sent_bytes", "Bytes of answers", ["route"])
+        text = "Seconds of a job by stage"
+        self._stage_seconds = histogram("pns_stage_seconds", text, ["stage"], buckets=SECONDS)
+        text = "Seconds that a job waited"
+        self._queue_seconds = histogram("pns_queue_seconds", text, buckets=SECONDS)
+        self._faces = counter("pns_faces", "Faces that came in and went out", ["direction"])
+        runs = {"version": version("pns-subdivision"), "python": platform.python_version()}
+        Info("pns_build", "What runs", registry=own).info(runs)
+        labels = ["name", "hash", "default"]
+        self._model = Gauge("pns_model_info", "The models that are served", labels, registry=own)
         ProcessCollector(registry=own)
         PlatformCollector(registry=own)
         self.registry.register(_WorkerMemory())
