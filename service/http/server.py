@@ -63,7 +63,7 @@ class PromptServer(uvicorn.Server):
         listening: list[socket.socket] | None = None,
     ) -> None:
         super().__init__(config)
-        self._listening = listening
+        self.listening = listening
         self._head_seconds = head_seconds
         self._most = most
         # By connection: since when it is idle, after which request, and what of its answer its
@@ -77,7 +77,7 @@ class PromptServer(uvicorn.Server):
 
     async def serve(self, sockets: list[socket.socket] | None = None) -> None:
         """Serve on the sockets that it was made with, or as its configuration says."""
-        await super().serve(sockets or self._listening)
+        await super().serve(sockets or self.listening)
 
     async def on_tick(self, counter: int) -> bool:
         """End idle connections, ten times a second."""
@@ -187,7 +187,7 @@ def serve(settings: Settings) -> None:
     with _listening(settings.host, settings.port, "give another --host or --port"):
         log_lines.configure()
         app = create_app(settings)
-        server = DrainingServer(app, settings, _metrics_server(app.state.metrics, settings))
+        server = DrainingServer(app, settings, metrics_server(app.state.metrics, settings))
     # Under nohup the signal stays ignored.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
@@ -209,7 +209,7 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
         raise StartError(f"{what}{reason}{where}; {hint}") from error
 
 
-def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:
+def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     """Return what serves the metrics, where they have a port. Raises StartError."""
     host, wanted = settings.metrics_host, settings.metrics_port
     if wanted is None:
