@@ -1,5 +1,5 @@
-"""Runs that are stopped, by Ctrl-C, SIGTERM or a terminal that closes: they end in order, and say
-how to go on."""
+"""Commands on POSIX systems alone, and runs that are stopped, by Ctrl-C, SIGTERM or a terminal that
+closes: they end in order, and say how to go on."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from types import FrameType
+from typing import TYPE_CHECKING
 
-from rich.console import Console
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def check_posix(command: str) -> None:

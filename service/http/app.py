@@ -16,10 +16,10 @@ from starlette.types import ASGIApp
 from ..settings import Settings
 from ..workers import jobs
 from ..workers.budget import FacesBudget
+from ..workers.catalogue import Catalogue
 from ..workers.costs import Cost
 from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
-from ..workers.models import Catalogue
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
 from . import layers, openapi, pages, problems, routes

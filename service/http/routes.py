@@ -14,8 +14,8 @@ from starlette.responses import Response
 from ..bodies import media
 from ..errors import NoModelError
 from ..settings import Settings
+from ..workers.catalogue import ModelEntry
 from ..workers.job import Job
-from ..workers.models import ModelEntry
 from . import documentation
 from .admission import DrainingError
 from .answer import FileAnswer, answer_type, server_timing, unless_gone

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import check_choice
 from ..settings import Settings
+from ..workers.catalogue import Catalogue
 from ..workers.desk import Desk
-from ..workers.models import Catalogue
 from ..workers.pool import Workers
 from .admission import Admission
 from .jobs.book import JobBook

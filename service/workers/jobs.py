@@ -26,7 +26,7 @@ from .progress import Reporter
 if TYPE_CHECKING:
     from pns_common.model.session import Model
 
-    from .models import Catalogue
+    from .catalogue import Catalogue
 
 log = logging.getLogger("pns.service")
 
@@ -197,6 +197,6 @@ def hold_model(model: Model | str | None, providers: Sequence[str] | None = None
 
 def catalogue() -> Catalogue:
     """Return what this worker's models say of themselves."""
-    from .models import catalogue_of
+    from .catalogue import catalogue_of
 
     return catalogue_of(_MODELS)

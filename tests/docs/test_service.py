@@ -13,7 +13,7 @@ from service.http import documentation, routes  # noqa: F401  (every error's cla
 from service.http.server import HEAD_BYTES
 from service.http.watch.journal import GONE
 from service.settings import Settings
-from service.workers.models import ModelEntry
+from service.workers.catalogue import ModelEntry
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS, PAGE = (

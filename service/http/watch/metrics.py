@@ -28,7 +28,7 @@ from prometheus_client.registry import Collector
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ...workers.models import Catalogue
+from ...workers.catalogue import Catalogue
 from .journal import Entry
 
 # From a small mesh to the longest job.

@@ -20,7 +20,7 @@ from service.http.app import create_app
 from service.http.service import ReadOnce
 from service.meshfiles.example import part_glb
 from service.settings import Settings
-from service.workers.models import Catalogue
+from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 from tests.support.networks import DEFAULT_CARD

@@ -20,7 +20,7 @@ from service.http.server import metrics_server
 from service.http.watch.metrics import Metrics, scrapes
 from service.log_lines import LONGEST, REQUEST_ID, JsonLines, TerminalLines
 from service.settings import Settings
-from service.workers.models import Catalogue
+from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 
