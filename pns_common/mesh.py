@@ -431,13 +431,13 @@ def _first_alike(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Intege
     if (number[1:] != number[:-1]).all():
         return np.arange(len(faces))
     # From the lowest vertex on, towards its lower neighbour.
-    lowest: Integer[np.ndarray, " F"] = faces.argmin(axis=1)
-    places = (lowest[:, None] + np.arange(faces.shape[1])) % faces.shape[1]
-    rows = np.take_along_axis(faces, places, axis=1)
+    every, degree = np.arange(len(faces))[:, None], faces.shape[1]
+    first: Integer[np.ndarray, " F"] = np.argmin(faces, axis=1)
+    rows = faces[every, (first[:, None] + np.arange(degree)) % degree]
     back = rows[:, 1] > rows[:, -1]
     rows[back, 1:] = rows[back, :0:-1]
-    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return first[group.reshape(-1)]
+    _, leader, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return leader[group.reshape(-1)]
 
 
 def _array(values: object, element: str) -> np.ndarray:
