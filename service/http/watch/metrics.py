@@ -42,7 +42,7 @@ class Metrics:
 
     def __init__(self) -> None:
         own = self.registry = CollectorRegistry()
-        counter, histogram = (partial(kind, registry=own) for kind in (Counter, Histogram))
+        counter, histogram = partial(Counter, registry=own), partial(Histogram, registry=own)
         self._requests = counter(
             "pns_requests", "Requests that have ended", ["route", "method", "status", "code"]
         )
