@@ -14,8 +14,6 @@ from .text import count_words, plain_letters, plain_text
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
-# A facet of an STL as text: a normal, three vertices, and the words that name and enclose them.
-WORDS_PER_FACET = 21
 # What is cut into words in one go, which takes many times its size.
 PIECE = 2**18
 # Each corner beyond the second makes a triangle; a keyword or a count stands before them.
@@ -32,7 +30,7 @@ def count_triangles(data: bytes, kind: str) -> int:
     """
     if kind == "stl":
         text = stl.is_text(data)
-        return count_words(data) // WORDS_PER_FACET if text else stl.count_facets(data)
+        return count_words(data) // stl.WORDS_PER_FACET if text else stl.count_facets(data)
     if kind == "ply":
         return _of_ply(data)
     text = plain_text(data)

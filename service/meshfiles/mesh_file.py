@@ -44,9 +44,10 @@ class Labels:
     names: tuple[str, ...]
     of_face: Int[np.ndarray, " F"]
 
-    def named(self, name: str) -> Bool[np.ndarray, " F"]:
-        """Return which faces have a name."""
-        return self.of_face == (self.names.index(name) if name in self.names else NONE - 1)
+    def named(self, name: str, *, words: bool = False) -> Bool[np.ndarray, " F"]:
+        """Return which faces have a name; with `words`, or one of several between blanks."""
+        own = [name == each or (words and name in each.split()) for each in self.names]
+        return np.array([*own, False])[self.of_face]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,14 @@ def shown(layer: str) -> str:
 def as_fractions(values: np.ndarray) -> np.ndarray:
     """Return colours as fractions of 1, whatever type stores them."""
     return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
+
+
+def colours_of(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions, bytes or words: other whole numbers count to 255."""
+    if values.dtype.str[1:] in ("u1", "u2"):
+        return values
+    whole = values.dtype.kind in "ui" or ((values > 1).any() and (values == np.rint(values)).all())
+    return np.clip(values, 0, 255).astype(np.uint8) if whole else values
 
 
 def joined_layer(

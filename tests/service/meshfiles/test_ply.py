@@ -101,7 +101,10 @@ def test_a_file_that_was_cut_off_says_where(order: str) -> None:
         (ply("<").replace(b"uint vertex", b"quad vertex"), "line 9 of the PLY header"),
         (ply("<")[:100], "its header has no end"),
         (ply("").replace(b"4 0 1 2 3", b"4 0 1,5 2 3"), r"line 16 of the PLY file: '1,5'"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "a whole number"),
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "vertex_indices .* 1.5, no whole number"),
+        (ply("").replace(b"4 0 1 2 3", b"4.5 0 1 2 3"), "ends after"),
+        # No comment, which would hide the numbers behind it.
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1 #2 3"), r"line 16 of the PLY file: '#2'"),
         (ply("").replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
         (b"OFF\n", "this is not a PLY"),
     ],

@@ -93,6 +93,16 @@ def test_triangles_stay_in_the_order_of_their_polygons() -> None:
     assert len(mesh.faces) == 1 + 6 + 1
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_side_that_turns_back_to_where_it_came_from_has_no_area(turn: int) -> None:
+    points = [(0, 0), (4, 0), (4, 4), (2, 4), (2, 8), (2, 4), (0, 4)]
+    mesh = cut(points, [0, 1, 2, 3, 4, 5, 6][::turn])
+    assert np.abs(areas(mesh)).sum() == pytest.approx(16, rel=1e-9)
+    assert {(2, 4)} <= {tuple(point) for point in mesh.vertices[mesh.corners][:, :2].tolist()}
+    beyond = cut([*points[:5], (2, 5), (0, 4)], [*range(7)])
+    assert any("cross themselves" in change.what for change in beyond.changes)
+
+
 def test_a_polygon_that_crosses_itself_is_reported() -> None:
     mesh = cut([(0, 0), (1, 1), (1, 0), (0, 1)], [0, 1, 2, 3])
     assert len(mesh.faces) == 2
