@@ -94,24 +94,21 @@ class MeshFile:
 
     def of_faces(self, keep: Bool[np.ndarray, " F"]) -> MeshFile:
         """Return a copy of some of its faces."""
-        corner = np.repeat(keep, self.sizes)
-        return replace(
-            self,
-            offsets=offsets_of(self.sizes[keep]),
-            corners=self.corners[corner],
-            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
-            face_values={name: values[keep] for name, values in self.face_values.items()},
-            labels={k: Labels(own.names, own.of_face[keep]) for k, own in self.labels.items()},
-        )
+        return self._taken(offsets_of(self.sizes[keep]), np.repeat(keep, self.sizes), keep)
 
     def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
         """Return the triangles of its faces, by the places of their corners and by their face."""
-        flat = places.reshape(-1)
+        return self._taken(np.arange(0, places.size + 1, 3), places.reshape(-1), face)
+
+    def _taken(
+        self, offsets: Int[np.ndarray, " G1"], corner: np.ndarray, face: np.ndarray
+    ) -> MeshFile:
+        """Return some corners as faces that begin at `offsets` and are parts of some faces."""
         return replace(
             self,
-            offsets=np.arange(0, len(flat) + 1, 3),
-            corners=self.corners[flat],
-            layers={name: Layer(own.values, own.rows[flat]) for name, own in self.layers.items()},
+            offsets=offsets,
+            corners=self.corners[corner],
+            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
             face_values={name: values[face] for name, values in self.face_values.items()},
             labels={k: Labels(own.names, own.of_face[face]) for k, own in self.labels.items()},
         )

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int
 
 from .mesh_file import (
     COLOUR,
@@ -43,7 +43,7 @@ _DROPPED = {
     b"curv2": "free-form curves",
     b"surf": "free-form surfaces",
 }
-_SLASH, _ZERO = b"/0"
+(_SLASH,) = b"/"
 # Colours as ZBrush writes them.
 _PAINT = re.compile(rb"(?m)^#MRGB[ \t]+([0-9A-Fa-f]+)")
 _REFERENCES = re.compile(rb"[+-]?\d+(?:/(?:[+-]?\d+)?){0,2}")
@@ -128,31 +128,22 @@ def _references(
         references = np.zeros((len(words), 3), dtype=np.int64)
         references[:, 0] = text.numbers(words, np.int64)
         return references, sizes
-    values = parsed(_three_numbers(letters).tobytes(), np.int64)
-    if len(values) != 3 * len(words):
+    blank = letters <= ord(" ")
+    slashes = np.searchsorted(
+        np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
+    )
+    counts = 1 + np.diff(slashes, prepend=0)
+    corners = np.where(blank, np.uint8(ord(" ")), letters).tobytes()
+    # What is left out is 0.
+    corners = corners.replace(b"//", b"/0/").replace(b"/ ", b"/0 ").replace(b"/", b" ")
+    values = parsed(corners, np.int64)
+    if counts.max() > 3 or len(values) != counts.sum():
         bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
         raise text.word_fault(bad, "no corner of a face")
-    return values.reshape(-1, 3), sizes
-
-
-def _three_numbers(letters: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
-    """Write corners of one to three numbers as three each, 0 where none stands."""
-    slash = letters == _SLASH
-    blank = letters <= ord(" ")
-    follows = np.append(slash[1:] | blank[1:], True)
-    left_out = np.flatnonzero(slash & follows) + 1
-    ends = np.flatnonzero(blank & np.append(False, ~blank[:-1]))
-    slashes = np.diff(np.searchsorted(np.flatnonzero(slash), ends), prepend=0)
-    letters = np.where(slash, np.uint8(ord(" ")), letters)
-    short = [np.repeat(ends[slashes < 2], 2), np.repeat(ends[slashes < 1], 2)]
-    places = np.concatenate([left_out, *short])
-    fill = np.concatenate(
-        [
-            np.full(len(left_out), _ZERO),
-            np.tile(np.frombuffer(b" 0", np.uint8), (len(short[0]) + len(short[1])) // 2),
-        ]
-    )
-    return np.insert(letters, places, fill)
+    places = np.arange(len(values)) - np.repeat(np.cumsum(counts) - counts, counts)
+    references = np.zeros((len(words), 3), dtype=np.int64)
+    references[np.repeat(np.arange(len(words)), counts), places] = values
+    return references, sizes
 
 
 def _absolute(

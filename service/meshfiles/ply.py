@@ -384,9 +384,10 @@ def write_ply(mesh: MeshFile) -> bytes:
     fields, columns = [], []
     for name, values in mesh.face_values.items():
         add(_names_of(name, values.shape[1]), values, values.dtype.str[1:])
-    head += [f"element face {len(mesh.sizes)}", "property list uchar int vertex_indices"]
+    count = "u1" if mesh.sizes.max(initial=0) < 256 else "i4"
+    head += [f"element face {len(mesh.sizes)}", f"property list {_NAMES[count]} int vertex_indices"]
     head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
-    faces = _face_bytes(mesh, fields, columns)
+    faces = _face_bytes(mesh, count, fields, columns)
     return b"".join(["\n".join([*head, "end_header\n"]).encode("latin-1"), vertex.tobytes(), faces])
 
 
@@ -413,23 +414,19 @@ def _records(
     return table
 
 
-def _face_bytes(mesh: MeshFile, fields: list[tuple[str, str]], columns: list[np.ndarray]) -> bytes:
-    """Write polygons: a byte for the count, the corners, and what faces have beside them."""
+def _face_bytes(
+    mesh: MeshFile, count: str, fields: list[tuple[str, str]], columns: list[np.ndarray]
+) -> bytes:
+    """Write polygons: how many corners, the corners, and what faces have beside them."""
     sizes = mesh.sizes
-    kinds = [(f"c{place}", f"<{kind}") for place, (_, kind) in enumerate(fields)]
-    if len(sizes) and (sizes == sizes[0]).all():
-        size = int(sizes[0])
-        table = np.zeros(len(sizes), [("n", "u1"), ("corners", "<i4", (size,)), *kinds])
-        table["n"], table["corners"] = size, mesh.corners.reshape(-1, size)
-        for (name, _), column in zip(kinds, columns, strict=True):
-            table[name] = column
-        return table.tobytes()
-    corners = mesh.corners.astype("<i4").tobytes()
-    behind = _records(fields, columns, len(sizes))
-    offsets = (4 * mesh.offsets).tolist()
-    return b"".join(
-        bytes([size]) + corners[begin:end] + behind[face].tobytes()
-        for face, (size, begin, end) in enumerate(
-            zip(sizes.tolist(), offsets[:-1], offsets[1:], strict=True)
-        )
-    )
+    beside = np.dtype(count).itemsize + sum(np.dtype(kind).itemsize for _, kind in fields)
+    starts = offsets_of(beside + 4 * sizes)
+    content = np.empty(starts[-1], dtype=np.uint8)
+    for size in np.unique(sizes).tolist():
+        chosen = np.flatnonzero(sizes == size)
+        corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
+        rows = [np.full(len(chosen), size), *corners.T, *(column[chosen] for column in columns)]
+        kinds = [("", count), *[("", "i4")] * size, *fields]
+        table = _records(kinds, rows, len(chosen)).view(np.uint8).reshape(len(chosen), -1)
+        content[starts[chosen, None] + np.arange(table.shape[1])] = table
+    return content.tobytes()

@@ -141,3 +141,16 @@ def test_normals_colours_and_double_positions_come_back_in_their_types() -> None
 
 def test_triangles_are_counted_by_the_header() -> None:
     assert count_triangles(ply("<"), "ply") == count_triangles(ply(""), "ply") == len(FANS)
+
+
+def test_faces_of_more_corners_than_a_byte_counts_are_written_whole() -> None:
+    for sizes in ([300], [3, 300, 4]):
+        offsets = np.append(0, np.cumsum(sizes))
+        corners = np.concatenate([np.arange(size) for size in sizes])
+        points = np.random.default_rng(0).random((300, 3))
+        values = {"_weight": np.arange(len(sizes), dtype=np.int32)[:, None]}
+        mesh = MeshFile(points, offsets, corners, face_values=values)
+        again = read_ply(write(mesh, "ply"))
+        assert again.corners.tolist() == corners.tolist()
+        assert again.sizes.tolist() == sizes
+        assert again.face_values["weight"].tolist() == [[face] for face in range(len(sizes))]
