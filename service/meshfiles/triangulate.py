@@ -188,15 +188,18 @@ def _without_spikes(
     points: Float[np.ndarray, "n 2"], own: Int[np.ndarray, " m"]
 ) -> Int[np.ndarray, " k"]:
     """Return corners of a polygon but those where it turns back to the corner before."""
-    ring = own.tolist()
-    place = 0
-    while place < len(ring) > 3:
-        if (points[ring[place - 1]] == points[ring[(place + 1) % len(ring)]]).all():
-            ring = [c for k, c in enumerate(ring) if k not in (place, (place + 1) % len(ring))]
-            place = max(place - 1, 0)
-        else:
-            place += 1
-    return np.array(ring)
+    places, ring = points.tolist(), list[int]()
+    for corner in own.tolist():
+        ring.append(corner)
+        while len(ring) > 2 and places[ring[-1]] == places[ring[-3]]:
+            del ring[-2:]
+    # Where the outline begins the last corner, or the first, may be one.
+    begin, end = 0, len(ring)
+    while end - begin > 2 and places[ring[end - 2]] == places[ring[begin]]:
+        end -= 2
+    while end - begin > 2 and places[ring[end - 1]] == places[ring[begin + 1]]:
+        begin, end = begin + 1, end - 1
+    return np.array(ring[begin:end], dtype=np.int64)
 
 
 def _earcut(points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "t 3"] | None:
