@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from ..errors import UnreadableError
-from . import stl
+from . import off, stl
 from .ply import POLYGON, ply_header
 from .text import count_words, plain_letters, plain_text
 
@@ -37,7 +37,8 @@ def count_triangles(data: bytes, kind: str) -> int:
     if kind == "obj":
         return sum(_triangles(words[firsts == ord("f")]) for words, firsts in _lines(text))
     start = plain_letters(text[:START], continued=False)[0].tobytes()
-    numbers = start.partition(b"OFF")[2].split(maxsplit=2)[:2]
+    header = off.HEADER.match(start)
+    numbers = start[header.end() :].split(maxsplit=2)[:2] if header else []
     if len(numbers) == 2 and numbers[1].isdigit():
         return _in_last_lines(text, int(numbers[1]))
     return len(data) // BYTES_PER_FACE

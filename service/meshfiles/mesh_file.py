@@ -31,11 +31,6 @@ class Layer:
     values: Shaped[np.ndarray, "N K"]
     rows: Int[np.ndarray, " C"]
 
-    @property
-    def complete(self) -> bool:
-        """True where every corner has a value."""
-        return bool((self.rows >= 0).all())
-
 
 @dataclass(frozen=True, eq=False)
 class Labels:

@@ -16,7 +16,7 @@ from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
 # The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0". Or they
 # stand alone: Geomview asks for no header. Open3D writes NCOFF where Geomview has CNOFF.
-_HEADER = re.compile(
+HEADER = re.compile(
     rb"\s*(?:#[^\n]*\n\s*)*(?:((?:ST|[CN4])*)(?i:OFF)(?:[ \t]+(BINARY))?|(?=\d+[ \t]+\d+\s))"
 )
 _CUT_OFF = "the OFF file ends before its last face, or has none"
@@ -29,7 +29,7 @@ def read_off(data: bytes) -> MeshFile:
         UnreadableError: not a text OFF file, or one without all of its faces.
     """
     data = plain_text(data)
-    header = _HEADER.match(data)
+    header = HEADER.match(data)
     if header is None:
         raise UnreadableError("this is not an OFF file: it begins neither with OFF nor with counts")
     prefix = header[1] or b""

@@ -209,8 +209,10 @@ def _layers(vertex: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     left = {name: column for name, column in vertex.items() if name not in ("x", "y", "z")}
     layers: dict[str, np.ndarray] = {}
     for layer, choices in _LAYERS.items():
-        chosen = next((names for names in choices if set(names) <= left.keys()), ())
-        if not chosen or (layer == COLOUR and len({left[name].dtype for name in chosen}) > 1):
+        known = (names for names in choices if set(names) <= left.keys())
+        alike = layer != COLOUR
+        chosen = next((n for n in known if alike or len({left[name].dtype for name in n}) == 1), ())
+        if not chosen:
             continue
         values = np.stack([left.pop(name) for name in chosen], axis=1)
         layers[layer] = colours_of(values) if layer == COLOUR else values.astype(np.float64)

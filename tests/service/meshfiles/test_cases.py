@@ -323,6 +323,18 @@ def test_colours_of_faces_stay_with_the_faces_made_of_them() -> None:
         assert colours.tolist() == 4 * [[255, 0, 0]] + 4 * [[0, 0, 255]]
 
 
+def test_colours_of_faces_below_those_of_vertices_are_reported() -> None:
+    colour = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    points, faces = PLY_POINTS.replace("\n", " 255 0 0 .5\n"), PLY_FACES.replace("\n", " 0 0 255\n")
+    head = PLY_HEAD.format(f"{colour}property float alpha\n", colour)
+    made = refined((head + points + faces).encode(), "ply", "glb")
+    tree, binary = files.unpack(made.content)
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    assert (files.values_of(tree, binary, attributes["COLOR_0"])[:, :3] == [255, 0, 0]).all()
+    assert "_ALPHA" in attributes
+    assert any("colours of faces" in change["what"] for change in made.report["changes"])
+
+
 def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
     shape = box()
     flat = shape["indices"].reshape(-1)
