@@ -80,11 +80,17 @@ def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
 
 
 def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) -> Options:
-    """Return the options with `normals=auto` decided: smooth for a mesh without any normals."""
+    """Return the options with `normals=auto` decided.
+
+    Smooth for a mesh without any normals, and where no edge is to stay sharp for one that is shaded
+    flat: its normals would show the faces that it had.
+    """
     if options.normals != "auto":
         return options
-    given = any("NORMAL" in primitive.attributes for primitive in primitives)
-    return replace(options, normals="keep" if given else "smooth")
+    given = [p for p in primitives if "NORMAL" in p.attributes]
+    corners = (p.attributes["NORMAL"][p.corners] for p in given)
+    flat = options.crease == "off" and all((own == own[:, :1]).all() for own in corners)
+    return replace(options, normals="smooth" if flat or not given else "keep")
 
 
 def with_smooth_normals(
