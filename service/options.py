@@ -127,9 +127,9 @@ DESCRIPTIONS = {
     "_PNS_RATIO and _PNS_GATE of the last learned level",
     "uv": "smooth: Loop's stencil inside charts; their boundaries stay linear",
     "normals": "shading. auto: the file's normals; new ones, smooth but across sharp edges, where "
-    "a mesh of a glTF has none, and where it is shaded flat and crease is off. keep: the file's, "
-    "or none. smooth: new ones for every mesh. limit: those of the limit surface, with the option "
-    "limit",
+    "a mesh of a glTF has none, and where most faces are shaded flat and crease is off. keep: the "
+    "file's, or none. smooth: new ones for every mesh. limit: those of the limit surface, with the "
+    "option limit",
     "crease": "edges to keep sharp. auto: those that the model finds, and those that a glTF's "
     "shading marks. angle: and degrees, as in angle:40: edges that bend by more. normals: edges "
     "where the file's normals differ. off: none, everything becomes round",

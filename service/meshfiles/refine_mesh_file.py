@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pns_common.errors import MeshError
+from pns_common.mesh import fans
 from pns_common.rows import marked
 from pns_common.schemes import Scheme
 
@@ -22,6 +23,7 @@ from ..gltf.read.plan import (
     check_memory,
 )
 from ..gltf.refine.meshes import refine_alone, stage_shares
+from ..gltf.refine.new_normals import MOST, are_one
 from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
@@ -83,12 +85,11 @@ def refine_mesh_file(
 
 
 def _is_flat(mesh: MeshFile) -> bool:
-    """Return whether there are normals, and each face has one."""
-    if NORMAL not in mesh.layers:
+    """Return whether there are normals, and most faces have one."""
+    if NORMAL not in mesh.layers or not mesh.layers[NORMAL].complete:
         return False
-    normals, rows = mesh.layers[NORMAL].values, mesh.layers[NORMAL].rows
-    first = np.repeat(rows[mesh.offsets[:-1]], mesh.sizes)
-    return bool((rows >= 0).all() and (normals[rows] == normals[first]).all())
+    normals = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows]
+    return bool(are_one(normals[fans(mesh.offsets)[0]]).mean() > MOST)
 
 
 def _refine_triangles(

@@ -40,7 +40,7 @@ export function showPromises(report: Report, lengths: Lengths): string {
 
 /** The settings that advice may name: the service's options, and the page's words. */
 const WORDS: [RegExp, string][] = [
-  [/\buse crease=angle:(\d+)/, "choose Sharp edges: By angle, sharper than $1°"],
+  [/\buse crease=angle:(\d+)/, "choose Sharp edges: By angle, above $1°"],
   [/\b(use )?crease=off/, "choose Sharp edges: None"],
   [/\buse normals=smooth/, "choose Shading: Smooth"],
   [/\buse weld_tolerance=[\d.]+/, "switch on Close small gaps"],
