@@ -13,7 +13,7 @@ from pns_common.rows import distinct_rows, marked
 
 from ..errors import UnreadableError, UnrefinableError
 from ..gltf.read.plan import check_memory
-from ..meshes.far_from_origin import STEPS, faces_too_far
+from ..gltf.refine.changes import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
 from ..options import Limits
 from ..report import Change

@@ -16,8 +16,7 @@ from jaxtyping import Int
 from ..bodies.sibling_files import Opened, SiblingFiles
 from ..course import Course
 from ..gltf.constants import COMPONENT_TYPES, FLOAT, NGONS, UNSIGNED_INT
-from ..gltf.read.container import read_glb, write_glb
-from ..gltf.read.json_text import decode_object, encode
+from ..gltf.read.container import decode_object, encode, read_glb, write_glb
 from ..gltf.read.resources import embed_images
 from ..gltf.read.schema import Accessor, view
 from ..gltf.refine.attributes import Columns, RefinedPrimitive

@@ -14,8 +14,8 @@ from ...options import Options
 from ...workers.job import Job, State
 from ...workers.memory_file import MemoryFile
 from .. import problems
-from ..intake import Asked, Wanted, asked_of, made_of
-from ..result_room import result_folder
+from ..intake import Wanted, made_of
+from ..room import result_folder
 from .book import Entry, NoSuchJobError
 from .store import (
     ANSWER,
@@ -30,6 +30,9 @@ from .store import (
 
 if TYPE_CHECKING:
     from ..service import Service
+
+# Of a job's work what a request names, beside its options.
+ASKED = ("model", "target", "content_type", "encoding", "request_id")
 
 View = Callable[[Job], dict[str, Any]]
 
@@ -53,7 +56,9 @@ class SharedJobs:
     async def publish(self, job: Job, owner: str | None) -> None:
         """Make a job known to other replicas, with its body. Raises StoreError."""
         body = b"".join(job.body.pieces())
-        await self.store.create(job.id, owner, asdict(asked_of(job)), self._view(job), body)
+        asked = {name: getattr(job.work, name) for name in ASKED}
+        asked |= {"client": job.client, "options": asdict(job.work.options)}
+        await self.store.create(job.id, owner, asked, self._view(job), body)
 
     async def beat(self, entry: Entry) -> None:
         """Keep a job leased while it is worked on; cancel it where its client wants that."""
@@ -138,17 +143,17 @@ class SharedJobs:
             await self._fail(record, StoreError("the file is no longer kept: send it again"))
             return True
         settings = service.settings
-        fields: dict[str, Any] = record.asked | {"options": Options(**record.asked["options"])}
-        asked = Asked(**fields)
+        options = Options(**record.asked["options"])
+        asked: dict[str, Any] = record.asked | {"options": options}
         patience = settings.queue_seconds + settings.job_seconds
         async with AsyncExitStack() as held:
-            counted = held.enter_context(service.admission.body(asked.client))
+            counted = held.enter_context(service.admission.body(asked["client"]))
             counted.grow(len(content))
             wanted = Wanted(True, True, result_folder(settings), patience)
             with ExitStack() as files:
                 body = files.enter_context(MemoryFile())
                 body.append(content)
-                job = made_of(settings, asked, body, wanted)
+                job = made_of(settings, body, wanted, **asked)
                 files.pop_all()
             held.callback(job.close)
             job.id = record.id

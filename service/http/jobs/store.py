@@ -9,8 +9,10 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from ...errors import ServiceError
 from ...settings import Settings, StartError
@@ -51,30 +53,14 @@ class Record:
     cancelled: bool
 
 
-class Files(Protocol):
-    """Place of bodies and results."""
-
-    async def write(self, name: str, content: bytes, seconds: float) -> None:
-        """Keep a file, for so many seconds at least."""
-        ...
-
-    async def read(self, name: str) -> bytes | None:
-        """Return a file; None where there is none."""
-        ...
-
-    async def delete(self, *names: str) -> None:
-        """Delete files; those that are not there are no error."""
-        ...
-
-
 class RedisFiles:
-    """Files as values of Redis, which deletes them in time."""
+    """Bodies and results as values of Redis, which deletes them in time."""
 
     def __init__(self, redis: Any) -> None:
         self._redis = redis
 
     async def write(self, name: str, content: bytes, seconds: float) -> None:
-        """Keep a file."""
+        """Keep a file, for so many seconds."""
         await self._redis.set(f"{PREFIX}{name}", content, px=_milliseconds(seconds))
 
     async def read(self, name: str) -> bytes | None:
@@ -82,12 +68,12 @@ class RedisFiles:
         return await self._redis.get(f"{PREFIX}{name}")
 
     async def delete(self, *names: str) -> None:
-        """Delete files."""
+        """Delete files; those that are not there are no error."""
         await self._redis.delete(*(f"{PREFIX}{name}" for name in names))
 
 
 class BucketFiles:
-    """Files in a bucket or a folder, by fsspec; a rule of the bucket is to delete old ones."""
+    """Bodies and results in a bucket or a folder, by fsspec; a rule of it is to delete old ones."""
 
     def __init__(self, url: str) -> None:
         import fsspec
@@ -99,7 +85,7 @@ class BucketFiles:
         return f"{self._root}/{name.replace(':', '-')}"
 
     async def write(self, name: str, content: bytes, seconds: float) -> None:
-        """Keep a file."""
+        """Keep a file; how long is for the rule to say."""
         await asyncio.to_thread(self._system.pipe_file, self._path(name), content)
 
     async def read(self, name: str) -> bytes | None:
@@ -110,7 +96,7 @@ class BucketFiles:
             return None
 
     async def delete(self, *names: str) -> None:
-        """Delete files."""
+        """Delete files; those that are not there are no error."""
         for name in names:
             try:
                 await asyncio.to_thread(self._system.rm_file, self._path(name))
@@ -137,7 +123,7 @@ class JobStore:
         self._replica = secrets.token_hex(8)
         self._seconds = settings.queue_seconds + settings.job_seconds + settings.result_seconds
         self._result_seconds = settings.result_seconds
-        self._files: Files = (
+        self._files = (
             RedisFiles(self._redis)
             if settings.store_files is None
             else BucketFiles(settings.store_files)
@@ -157,7 +143,7 @@ class JobStore:
     ) -> None:
         """Write a new job down, and lease it."""
         fields = {"owner": json.dumps(owner), "asked": json.dumps(asked), "view": json.dumps(view)}
-        async with self._reached():
+        with self._reached():
             await self._files.write(f"{BODY}:{job_id}", body, self._seconds)
             async with self._redis.pipeline() as steps:
                 steps.hset(_record(job_id), mapping=fields)
@@ -168,7 +154,7 @@ class JobStore:
 
     async def beat(self, job_id: str, view: dict[str, Any]) -> bool:
         """Renew the lease of a job, and write how far it is; False where nobody wants it."""
-        async with self._reached():
+        with self._reached():
             async with self._redis.pipeline() as steps:
                 steps.hget(_record(job_id), "cancelled")
                 steps.exists(_record(job_id))
@@ -180,7 +166,7 @@ class JobStore:
 
     async def finish(self, job_id: str, view: dict[str, Any], results: dict[str, bytes]) -> None:
         """Keep the end of a job, and its results."""
-        async with self._reached():
+        with self._reached():
             for name, content in results.items():
                 await self._files.write(f"{name}:{job_id}", content, self._result_seconds)
             async with self._redis.pipeline() as steps:
@@ -193,12 +179,12 @@ class JobStore:
 
     async def release(self, job_id: str) -> None:
         """End the lease of a job that another replica is to do."""
-        async with self._reached():
+        with self._reached():
             await self._redis.delete(_lease(job_id))
 
     async def find(self, job_id: str) -> Record | None:
         """Return the record of a job; None where there is none."""
-        async with self._reached():
+        with self._reached():
             fields = await self._redis.hgetall(_record(job_id))
         if b"view" not in fields or b"asked" not in fields:
             return None
@@ -212,17 +198,17 @@ class JobStore:
 
     async def file(self, name: str, job_id: str) -> bytes | None:
         """Return a file of a job; None where it is no longer kept."""
-        async with self._reached():
+        with self._reached():
             return await self._files.read(f"{name}:{job_id}")
 
     async def cancel(self, job_id: str) -> None:
         """Tell the replica that works on a job to end it."""
-        async with self._reached():
+        with self._reached():
             await self._redis.hset(_record(job_id), "cancelled", "1")
 
     async def delete(self, job_id: str) -> None:
         """Forget a job."""
-        async with self._reached():
+        with self._reached():
             async with self._redis.pipeline() as steps:
                 steps.srem(OPEN, job_id)
                 steps.delete(_record(job_id), _lease(job_id))
@@ -231,7 +217,7 @@ class JobStore:
 
     async def take_orphan(self) -> Record | None:
         """Lease a job whose replica has died, and return it; None where there is none."""
-        async with self._reached():
+        with self._reached():
             for name in await self._redis.smembers(OPEN):
                 job_id = name.decode()
                 leased = await self._redis.set(
@@ -250,21 +236,12 @@ class JobStore:
                 await self.delete(job_id)
         return None
 
-    def _reached(self) -> _Reached:
-        return _Reached(self._errors)
-
-
-class _Reached:
-    """Turns the errors of the store into StoreError."""
-
-    def __init__(self, errors: tuple[type[Exception], ...]) -> None:
-        self._errors = errors
-
-    async def __aenter__(self) -> None:
-        return None
-
-    async def __aexit__(self, kind: object, error: BaseException | None, _: object) -> None:
-        if isinstance(error, self._errors):
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        """Turn the errors of the store into StoreError."""
+        try:
+            yield
+        except self._errors as error:
             raise StoreError(f"the store of jobs does not answer: {error}") from error
 
 
