@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from threading import Lock
+from typing import Any
 
 from numba.core import event  # pyright: ignore[reportMissingTypeStubs]
 
 from pns_common.kernels import ANNOUNCEMENT
 
+EVENTS: Any = event
 # Work of a face of a learned level, and of a limit, in faces that the base scheme makes.
 LEARNED_COST, LIMIT_COST = 6, 3
 # Seconds between two signs of life of a compilation.
@@ -72,14 +74,14 @@ class Progress:
         self._tell(round(self._total * share), self._total)
 
 
-class Compilation(event.Listener):  # type: ignore[misc]
+class Compilation(EVENTS.Listener):
     """Kernels compiled so far, and the seconds that took; tells `announce` about them."""
 
     def __init__(self, announce: Callable[[str], None]) -> None:
         self.kernels, self.seconds = 0, 0.0
         self._announce, self._depth, self._began, self._said = announce, 0, 0.0, 0.0
 
-    def on_start(self, event: object) -> None:
+    def on_start(self, _: object) -> None:
         """Note that a kernel begins; those that it calls are compiled within it, as numba locks."""
         self._depth += 1
         if self._depth > 1:
@@ -88,7 +90,7 @@ class Compilation(event.Listener):  # type: ignore[misc]
         if not self.kernels:
             self._say(f"{ANNOUNCEMENT}, longer on a busy machine")
 
-    def on_end(self, event: object) -> None:
+    def on_end(self, _: object) -> None:
         """Note that a kernel is compiled."""
         self._depth -= 1
         if self._depth:
@@ -104,8 +106,8 @@ class Compilation(event.Listener):  # type: ignore[misc]
 
 
 @contextmanager
-def compiling(announce: Callable[[str], None]) -> Iterator[Compilation]:
+def compiling(announce: Callable[[str], None]) -> Generator[Compilation, None, None]:
     """Announce what is compiled meanwhile, with a sign of life every QUIET seconds; count it."""
     compilation = Compilation(announce)
-    with event.install_listener("numba:compile", compilation):
+    with EVENTS.install_listener("numba:compile", compilation):
         yield compilation

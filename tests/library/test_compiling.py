@@ -1,4 +1,4 @@
-"""What is compiled is announced, and counted."""
+"""Announce and count what is compiled."""
 
 import numpy as np
 import pytest

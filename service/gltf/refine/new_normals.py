@@ -101,7 +101,8 @@ def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) 
 
 def are_one(normals: Float[np.ndarray, "F T 3"]) -> Bool[np.ndarray, " F"]:
     """Return which faces have one normal at all of their corners."""
-    return (np.abs(normals - normals[:, :1]) < SAME).all(axis=(1, 2))
+    same: Bool[np.ndarray, " F"] = np.all(np.abs(normals - normals[:, :1]) < SAME, axis=(1, 2))
+    return same
 
 
 def with_smooth_normals(
