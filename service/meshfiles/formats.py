@@ -163,7 +163,7 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         for name, layer in mesh.layers.items()
         if (form.layers is None or name in form.layers)
         # An OBJ names values corner by corner, but for colours.
-        and (layer.complete or (kind == "obj" and name != COLOUR))
+        and ((layer.rows >= 0).all() or (kind == "obj" and name != COLOUR))
     }
     lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
     if kind == "obj" and COLOUR in layers:

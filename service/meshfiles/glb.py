@@ -186,7 +186,8 @@ def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:
 def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
     """Return faces' colours as their corners', which is all that a glTF has; return what goes."""
     lost = {f"face property {name}": len(own) for name, own in mesh.face_values.items()}
-    lost.pop(f"face property {COLOUR}", None)
+    if lost.pop(f"face property {COLOUR}", 0) and COLOUR in mesh.layers:
+        lost["colours of faces, as vertices have some,"] = len(mesh.sizes)
     lost |= {f"{kind}s": len(own.names) for kind, own in mesh.labels.items() if kind != MATERIAL}
     why = "dropped: not written to GLB files"
     changes = [Change("", f"{what} {why}", count) for what, count in lost.items()]

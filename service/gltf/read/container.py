@@ -1,4 +1,8 @@
-"""Read and write the GLB container (glTF 2.0 §4): a header and chunks."""
+"""Read and write the GLB container (glTF 2.0 §4) and its JSON, with limits before decoding.
+
+A decoder's cost is in the values that it makes: 64 MiB of `{},` make tens of millions of objects.
+So the raw bytes are searched first for the characters that open or separate values.
+"""
 
 from __future__ import annotations
 
