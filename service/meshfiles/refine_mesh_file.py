@@ -86,10 +86,10 @@ def refine_mesh_file(
 
 def _is_flat(mesh: MeshFile) -> bool:
     """Return whether there are normals, and most faces have one."""
-    if NORMAL not in mesh.layers or not mesh.layers[NORMAL].complete:
+    layer = mesh.layers.get(NORMAL)
+    if layer is None or (layer.rows < 0).any():
         return False
-    normals = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows]
-    return bool(are_one(normals[fans(mesh.offsets)[0]]).mean() > MOST)
+    return bool(are_one(layer.values[layer.rows][fans(mesh.offsets)[0]]).mean() > MOST)
 
 
 def _refine_triangles(
