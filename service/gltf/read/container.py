@@ -211,7 +211,9 @@ def read_glb(data: bytes | memoryview) -> Container:
     if version != GLB_VERSION:
         raise UnreadableError(f"GLB version {version}, expected {GLB_VERSION}")
     if not _HEADER.size <= length <= len(data):
-        raise UnreadableError(f"the GLB header says {length} bytes, the file has {len(data)}")
+        short = ": the file is cut short" if length > len(data) else ""
+        text = f"the GLB header says {length} bytes, the file has {len(data)}{short}"
+        raise UnreadableError(text)
     chunks = _chunks(memoryview(data)[:length])
     if not chunks or chunks[0][0] != JSON_CHUNK:
         raise UnreadableError("the first chunk of the GLB is not JSON")
