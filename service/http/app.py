@@ -30,6 +30,7 @@ from .catalogue import ReadOnce
 from .jobs import routes as job_routes
 from .jobs import work as job_work
 from .jobs.book import JobBook
+from .jobs.room import Room
 from .jobs.shared import SharedJobs
 from .jobs.store import JobStore
 from .service import Service
@@ -88,7 +89,7 @@ def create_app(
     )
 
     metrics = Metrics()
-    _show(metrics, desk, book)
+    _show(metrics, desk)
     tracer = tracer_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
@@ -143,9 +144,16 @@ def create_app(
     if settings.store is not None:
         service.shared = SharedJobs(
             JobStore(settings),
+            Room(int(settings.result_bytes), settings.results),
             partial(job_work.job_json, service),
+            partial(job_work.shown, service),
             partial(job_work.begin_shared, service),
         )
+    metrics.gauge(
+        "pns_result_bytes",
+        "Results that are kept; with a store those of all replicas",
+        lambda: (service.shared or book).bytes,
+    )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
     app.openapi = openapi.Description(app)  # type: ignore[method-assign]
@@ -153,7 +161,7 @@ def create_app(
     return app
 
 
-def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
+def _show(metrics: Metrics, desk: Desk) -> None:
     """Set what the metrics say of jobs."""
     desk.watchers.append(
         lambda job: metrics.job(
@@ -164,7 +172,6 @@ def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
     )
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
-    metrics.gauge("pns_result_bytes", "Results that are kept", lambda: book.bytes)
     metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)
 
 
