@@ -7,7 +7,7 @@ from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BeforeValidator, ByteSize, Field
+from pydantic import AfterValidator, BeforeValidator, ByteSize, Field
 from pydantic_settings import NoDecode
 
 Network = IPv4Network | IPv6Network
@@ -61,8 +61,16 @@ def _host(text: str) -> str:
     return text.lower()
 
 
+def _store(text: str) -> str:
+    if not text.startswith(("redis://", "rediss://", "unix://")):
+        # Not what it is: it may hold a password.
+        raise ValueError("it is no address of a Redis, such as redis://HOST:6379/0")
+    return text
+
+
 Size = Annotated[ByteSize, BeforeValidator(_whole_size), Field(gt=0, le=_MOST_BYTES)]
 Seconds = Annotated[float, Field(gt=0)]
+Store = Annotated[str, AfterValidator(_store)]
 Name = Annotated[str, BeforeValidator(_not_empty)]
 Place = Annotated[Path, BeforeValidator(_not_empty)]
 Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]

@@ -9,7 +9,7 @@ from pydantic import ByteSize, Field, TypeAdapter, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
-from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size, Words
+from .setting_types import Hosts, Name, Networks, Origins, Place, Seconds, Size, Store, Words
 
 MIB = 1024**2
 PREFIX = "PNS_"
@@ -65,7 +65,8 @@ class Settings(BaseSettings):
     def _refuse_bodies_that_never_fit(self) -> Settings:
         if self.upload_bytes is not None and self.upload_bytes * 3 // 4 < self.body:
             raise ValueError(
-                "upload_bytes must be a third more than body: one client may have three quarters"
+                "PNS_UPLOAD_BYTES must be a third more than PNS_BODY: one client may have three "
+                "quarters of it"
             )
         return self
 
@@ -126,9 +127,8 @@ class Settings(BaseSettings):
     result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
     )
-    store: str | None = Field(
+    store: Store | None = Field(
         default=None,
-        pattern=r"^(rediss?|unix)://",
         description="Redis that replicas share, whichever a client asks for its job; none: each "
         "replica answers for its own",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
+from ..errors import ServiceError
 from ..settings import Settings
 from ..workers import jobs
 from ..workers.budget import FacesBudget
@@ -38,6 +39,9 @@ from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 
 log = logging.getLogger("pns.service")
+
+# How often a service that starts looks whether its workers are ready.
+READY_SECONDS = 0.1
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
@@ -106,12 +110,18 @@ def create_app(
         for pool in workers.values():
             pool.start()
         shared = service.shared
-        adopting = shared and asyncio.create_task(shared.adopt_for_ever(service))
+        beside = []
+        if shared is not None:
+            log.info("jobs are shared with other replicas; this one is %s", shared.store.replica)
+            beside.append(asyncio.create_task(shared.adopt_for_ever(service)))
+        if warm_up is None:
+            # Stand-ins load no model.
+            beside.append(asyncio.create_task(_tell_when_ready(service)))
         try:
             yield
         finally:
-            if adopting is not None:
-                adopting.cancel()
+            for task in beside:
+                task.cancel()
             await book.close()
             if shared is not None:
                 await shared.store.close()
@@ -159,6 +169,15 @@ def create_app(
     app.openapi = openapi.Description(app)  # type: ignore[method-assign]
     app.include_router(pages.router(settings.prefix))
     return app
+
+
+async def _tell_when_ready(service: Service) -> None:
+    """Log that the workers are ready, and read the models, which the metrics show."""
+    while not service.desk.ready:
+        await asyncio.sleep(READY_SECONDS)
+    log.info("ready: %d workers have loaded the model", service.settings.workers + 1)
+    with suppress(ServiceError):
+        await service.models.get()
 
 
 def _show(metrics: Metrics, desk: Desk) -> None:

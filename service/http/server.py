@@ -7,13 +7,18 @@ import logging
 import os
 import signal
 import socket
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from types import FrameType
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
 
 from .. import log_lines
+from ..errors import NoModelError
 from ..settings import Settings, StartError
+from ..workers.jobs import hold_model
 from . import descriptors
 from .admission import Admission
 from .app import create_app
@@ -39,6 +44,9 @@ class DrainingServer(PromptServer):
     Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
     answers: /readyz and new requests with 503; uvicorn's own shutdown would close the socket at
     once. A second signal, and the deadline, end what is under way with 503.
+
+    With a store other replicas answer for all that this one has, so it takes no connection any
+    more: a proxy that is refused one asks another replica at once.
     """
 
     def __init__(
@@ -50,6 +58,7 @@ class DrainingServer(PromptServer):
         metrics.gauge("pns_connections", "Open connections", self.count)
         self._admission: Admission = app.state.admission
         self._drain_seconds = settings.drain_seconds
+        self._shared = settings.store is not None
         self._beside = beside
         self._deadline: float | None = None
         self._signals = 0
@@ -99,7 +108,9 @@ class DrainingServer(PromptServer):
         """Decide, ten times a second, whether to exit."""
         if self._admission.draining:
             now = asyncio.get_running_loop().time()
-            self._deadline = self._deadline or now + self._drain_seconds
+            if self._deadline is None:
+                self._deadline = now + self._drain_seconds
+                self._begin_to_drain()
             self._admission.end_uploads()
             if self._signals > 1 or now >= self._deadline:
                 self._admission.end()
@@ -108,11 +119,24 @@ class DrainingServer(PromptServer):
                 self.should_exit = True
         return await super().on_tick(counter)
 
+    def _begin_to_drain(self) -> None:
+        log.info("draining: %d requests and jobs are under way", self._admission.admitted)
+        if not self._shared:
+            return
+        for server in self.servers:
+            server.close()
+        for connection in tuple(self.server_state.connections):
+            cycle: Any = getattr(connection, "cycle", None)
+            if cycle is not None and cycle.response_complete:
+                # What is still to be sent is sent.
+                connection.transport.close()
+
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
     # Uvicorn says between its log lines alone that a port is taken.
     with _listening(settings.host, settings.port, "give another --host or --port"):
+        check_model(settings)
         log_lines.configure()
         app = create_app(settings)
         server = DrainingServer(app, settings, _metrics_server(app.state.metrics, settings))
@@ -120,6 +144,18 @@ def serve(settings: Settings) -> None:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
     server.run()
+
+
+def check_model(settings: Settings) -> None:
+    """Load the served model where one is named. Raises StartError where it does not load."""
+    if settings.model is None:
+        return
+    # This process is to load none.
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        try:
+            pool.submit(hold_model, settings.model, settings.providers).result()
+        except NoModelError as error:
+            raise StartError(f"PNS_MODEL (or --model): {error.detail}") from error
 
 
 def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket:

@@ -12,7 +12,7 @@ import os
 import secrets
 import socket
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -278,7 +278,7 @@ class JobStore:
         self,
         job_id: str,
         view: dict[str, Any],
-        results: dict[str, Iterable[bytes]],
+        results: Mapping[str, Iterable[bytes]],
         networks: tuple[str, ...],
     ) -> None:
         """Keep the end of a job and its results, unless the job is no longer this replica's."""

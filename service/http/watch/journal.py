@@ -93,7 +93,7 @@ class Journal:
                 Entry(
                     id=name,
                     method=scope["method"] if scope["method"] in METHODS else "other",
-                    route=getattr(scope.get("route"), "path", None) or "none",
+                    route=_route(scope),
                     status=status if whole or status >= 400 else GONE,
                     code=state.get("problem", ""),
                     client=_client(scope),
@@ -118,6 +118,15 @@ class Journal:
         log.info("request", extra={"fields": fields, "request_id": entry.id})
         for listener in self.listeners:
             listener(entry)
+
+
+def _route(scope: Scope) -> str:
+    """Return the pattern of the route that was asked, also where a layer refused the request."""
+    route = scope.get("route")
+    if route is None and "app" in scope:
+        matches = (route.matches(scope) for route in scope["app"].routes)
+        route = next((child["route"] for match, child in matches if "route" in child), None)
+    return getattr(route, "path", None) or "none"
 
 
 def _client(scope: Scope) -> str:

@@ -28,7 +28,7 @@ from service.http.jobs.store import ANSWER, BODY, JobStore, Lease, RedisFiles
 from service.settings import Settings
 from service.workers.memory_file import MemoryFile
 from tests.support.live import served
-from tests.support.proxy import free_port
+from tests.support.proxy import free_port, proxied
 
 GLB = {"Content-Type": "model/gltf-binary"}
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
@@ -457,3 +457,31 @@ def test_a_replica_that_has_lost_its_lease_changes_nothing(
         await other.close()
 
     asyncio.run(scenario())
+
+
+def test_no_request_fails_behind_the_proxy_while_one_of_two_replicas_stops(
+    redis: str, tmp_path: Path
+) -> None:
+    """It has a job that runs, so it stops for a while, and takes nothing new."""
+    behind = {"PNS_PROXIES": "127.0.0.1"}
+    with ExitStack() as stack:
+        two = stack.enter_context(replicas(redis, tmp_path, behind, behind))
+        ends = [(url.host, url.port) for url in (httpx2.URL(address) for address, _ in two)]
+        front = stack.enter_context(proxied(ends[0], tmp_path, *ends[1:]))
+        client = stack.enter_context(opened(front))
+        first = stack.enter_context(httpx2.Client(base_url=two[0][0], timeout=600))
+        job = hand_in(first, f"steps {tmp_path}".encode())
+        while not (tmp_path / "took-1").exists():
+            time.sleep(0.01)
+        two[0][1].send_signal(signal.SIGTERM)
+        statuses = []
+        while "draining" not in (tmp_path / "log-0").read_text() or len(statuses) < 20:
+            answer = client.post("/subdivide", content=b"short", headers=GLB)
+            statuses.append(answer.status_code)
+            time.sleep(0.02)
+        assert set(statuses) == {200}
+        assert two[0][1].poll() is None
+        for number in (1, 2, 3):
+            (tmp_path / f"go-{number}").touch()
+        assert ended(client, job)["state"] == "done"
+        two[0][1].wait(60)
