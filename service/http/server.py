@@ -30,6 +30,8 @@ log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
+# How long a replica that takes no connection any more takes requests on those that it has.
+LAST_SECONDS = 1.0
 # Connections that wait in the system, and that the event loop takes of them in a turn.
 WAITING, A_TURN = 2048, 32
 # The longest head: request line and headers together.
@@ -46,7 +48,8 @@ class DrainingServer(PromptServer):
     once. A second signal, and the deadline, end what is under way with 503.
 
     With a store other replicas answer for all that this one has, so it takes no connection any
-    more: a proxy that is refused one asks another replica at once.
+    more: a proxy that is refused one asks another replica at once. What was on its way is served
+    for a second before anything is refused.
     """
 
     def __init__(
@@ -60,7 +63,7 @@ class DrainingServer(PromptServer):
         self._drain_seconds = settings.drain_seconds
         self._shared = settings.store is not None
         self._beside = beside
-        self._deadline: float | None = None
+        self._began: float | None = None
         self._signals = 0
 
     def count(self) -> int:
@@ -95,7 +98,8 @@ class DrainingServer(PromptServer):
             for headers in (self.server_state.default_headers, self.config.encoded_headers):
                 headers.append((b"connection", b"close"))
         self._signals += 1
-        self._admission.draining = True
+        if not self._shared or self._signals > 1:
+            self._admission.draining = True
         # The third is for a shutdown that hangs.
         self.force_exit = self._signals > 2
 
@@ -106,17 +110,21 @@ class DrainingServer(PromptServer):
 
     async def on_tick(self, counter: int) -> bool:
         """Decide, ten times a second, whether to exit."""
-        if self._admission.draining:
+        if self._signals:
             now = asyncio.get_running_loop().time()
-            if self._deadline is None:
-                self._deadline = now + self._drain_seconds
+            if self._began is None:
+                self._began = now
                 self._begin_to_drain()
-            self._admission.end_uploads()
-            if self._signals > 1 or now >= self._deadline:
-                self._admission.end()
-                self.should_exit = True
-            if self._admission.admitted == 0:
-                self.should_exit = True
+            late = now - self._began
+            if self._shared and late >= LAST_SECONDS:
+                self._admission.draining = True
+            if self._admission.draining:
+                self._admission.end_uploads()
+                if self._signals > 1 or late >= self._drain_seconds:
+                    self._admission.end()
+                    self.should_exit = True
+                if self._admission.admitted == 0:
+                    self.should_exit = True
         return await super().on_tick(counter)
 
     def _begin_to_drain(self) -> None:
