@@ -10,8 +10,7 @@ from typing import Literal, get_args
 from benchmarks.generated import torus, unrolled_torus
 from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
 from pns_common import load_model
-from service.bodies.folder import folder_of
-from service.bodies.sibling_files import ALONE, SiblingFiles
+from service.bodies.sibling_files import ALONE, SiblingFiles, folder_of
 from service.course import Course
 from service.errors import ServiceError
 from service.gltf.subdivide import Subdivided, subdivide_gltf

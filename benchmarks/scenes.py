@@ -22,8 +22,7 @@ from benchmarks.answers import served
 from pns_common import load_model
 from pns_common.model.file import DEFAULT_MODEL
 from service.gltf.constants import COMPONENT_TYPES
-from service.gltf.read.container import write_glb
-from service.gltf.read.json_text import encode
+from service.gltf.read.container import encode, write_glb
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from service.workers.worker import rare_searches

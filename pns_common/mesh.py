@@ -24,6 +24,8 @@ SMALLEST_EXTENT = 1e-70
 TRIANGLE = 3
 # meshio's names of faces, by their corners; the others are polygons.
 CELLS = {3: "triangle", 4: "quad"}
+# What it writes there of polygons: nothing.
+FILES_OF_TRIANGLES = (".stl", ".off")
 
 
 class Mesh:
@@ -123,11 +125,15 @@ class Mesh:
         return cls(read.points, faces)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file by meshio, by its ending; STL and OFF hold triangles alone.
+        """Write a file by meshio, by its ending.
 
         Raises:
             ImportError: meshio is not installed.
+            MeshError: there are polygons, and meshio writes triangles alone: as STL and OFF.
         """
+        if Path(path).suffix.lower() in FILES_OF_TRIANGLES and not self.triangles:
+            reason = f"polygons, expected triangles in {path}; triangulated() cuts them"
+            raise MeshError(reason, element="faces")
         alike = None if self._faces is None else [(self._faces.shape[1], self._faces)]
         runs = alike or groupby(self.polygons, len)
         cells = [(CELLS.get(count, "polygon"), np.array([*rows], np.int32)) for count, rows in runs]
@@ -245,8 +251,8 @@ class Cleaned:
     mesh: Mesh
     vertex_map: Integer[np.ndarray, " V"]
     face_map: Integer[np.ndarray, " F"]
-    # For each old face the new face with the same three vertices, or −1 if it was degenerate:
-    # what a dropped duplicate should follow.
+    # For each old face the new face with the same vertices, or −1 if it was degenerate: what a
+    # dropped duplicate should follow.
     representative: Integer[np.ndarray, " F"]
     dropped_degenerate: int
     dropped_duplicate: int
@@ -256,7 +262,7 @@ class Cleaned:
 def clean(mesh: Mesh) -> Cleaned:
     """Drop degenerate faces (a repeated vertex), duplicates and unreferenced vertices.
 
-    Faces are duplicates when they have the same three vertices in any order; the first stays.
+    Faces are duplicates when they run through the same vertices, either way round; the first stays.
     What stays keeps its order.
 
     Raises:
@@ -264,31 +270,31 @@ def clean(mesh: Mesh) -> Cleaned:
         MeshError: every face is degenerate.
     """
     check_is_mesh(mesh)
-    degenerate = repeated_vertex(mesh.faces)
+    degrees, leader = np.diff(mesh.offsets), np.arange(mesh.face_count)
+    degenerate = np.empty(mesh.face_count, dtype=bool)
+    for degree in np.unique(degrees):
+        rows = np.flatnonzero(degrees == degree)
+        faces = mesh.corners[mesh.offsets[rows, None] + np.arange(degree)]
+        degenerate[rows] = repeats = repeated_vertex(faces)
+        rows = rows[~repeats]
+        leader[rows] = rows[_first_alike(faces[~repeats], len(mesh.vertices))]
     if degenerate.all():
         raise MeshError("every face is degenerate", element="faces")
-    proper = np.flatnonzero(~degenerate)
-    leader = _first_alike(np.take(mesh.faces, proper, axis=0), len(mesh.vertices))
-    is_leader = leader == np.arange(len(proper))
-    number = np.cumsum(is_leader) - 1
-
-    representative = np.full(len(mesh.faces), -1, dtype=np.int64)
-    representative[proper] = number[leader]
-    face_map = np.full(len(mesh.faces), -1, dtype=np.int64)
-    face_map[proper[is_leader]] = number[is_leader]
-
-    kept = np.take(mesh.faces, proper[is_leader], axis=0)
+    stays = ~degenerate & (leader == np.arange(len(leader)))
+    number = np.cumsum(stays) - 1
+    kept = mesh.corners[np.repeat(stays, degrees)]
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[kept] = True
     vertex_map = np.where(used, np.cumsum(used) - 1, -1)
-    same = len(kept) == len(mesh.faces) and used.all()
+    offsets = np.append(0, np.cumsum(degrees[stays]))
+    same = stays.all() and used.all()
     return Cleaned(
-        mesh=mesh if same else Mesh(mesh.vertices[used], vertex_map[kept]),
+        mesh=mesh if same else Mesh(mesh.vertices[used], (vertex_map[kept], offsets)),
         vertex_map=vertex_map,
-        face_map=face_map,
-        representative=representative,
+        face_map=np.where(stays, number, -1),
+        representative=np.where(degenerate, -1, number[leader]),
         dropped_degenerate=int(degenerate.sum()),
-        dropped_duplicate=int(len(proper) - is_leader.sum()),
+        dropped_duplicate=int(len(leader) - degenerate.sum() - stays.sum()),
         dropped_vertices=int(len(used) - used.sum()),
     )
 
@@ -325,10 +331,12 @@ def check_is_mesh(given: object) -> None:
         raise ParameterError("mesh", type(given), expected=other)
 
 
-def repeated_vertex(faces: Integer[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
-    """Return whether a triangle names a vertex twice."""
-    a, b, c = faces.T
-    return (a == b) | (b == c) | (c == a)
+def repeated_vertex(faces: Integer[np.ndarray, "F N"]) -> Bool[np.ndarray, " F"]:
+    """Return whether a face names a vertex twice."""
+    if faces.shape[1] == TRIANGLE:
+        a, b, c = faces.T
+        return (a == b) | (b == c) | (c == a)
+    return (np.diff(np.sort(faces, axis=1), axis=1) == 0).any(axis=1)
 
 
 def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -338,23 +346,25 @@ def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         MeshError: as ``Mesh``.
     """
     several = isinstance(faces, list | tuple)
-    rows: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
-    degrees = [int(np.size(face)) for face in rows]
-    arrays: list[np.ndarray] = [face for face in rows if isinstance(face, np.ndarray)]
-    if isinstance(faces, tuple) and [array.ndim for array in arrays] == [1, 1] == [1] * len(rows):
-        corners, offsets = arrays
+    given: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
+    rows = [_array(face, "faces") for face in given]
+    degrees = [face.size for face in rows]
+    pair = [isinstance(face, np.ndarray) for face in given] == [True, True]
+    if isinstance(faces, tuple) and pair and [face.ndim for face in rows] == [1, 1]:
+        corners, offsets = rows
         _check_offsets(offsets, len(corners))
     elif len(set(degrees)) > 1:
-        corners = np.concatenate([_array(face, "faces").reshape(-1) for face in rows])
+        # An empty list has no integers to tell it from one of floats.
+        corners = np.concatenate([face.reshape(-1) for face in rows if face.size])
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(degrees)])
     else:
-        given = _array(rows if several else faces, "faces")
-        if given.size == 0:
+        table = _array(given if several else faces, "faces")
+        if table.size == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        if given.ndim != 2:
-            raise MeshError(f"shape {given.shape}, expected (F, 3)", element="faces")
-        corners = given.reshape(-1)
-        offsets = np.arange(0, corners.size + 1, int(given.shape[1]), dtype=np.int64)
+        if table.ndim != 2:
+            raise MeshError(f"shape {table.shape}, expected (F, 3)", element="faces")
+        corners = table.reshape(-1)
+        offsets = np.arange(0, corners.size + 1, int(table.shape[1]), dtype=np.int64)
     if len(corners) and corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
     few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
@@ -406,20 +416,28 @@ def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:
         )
 
 
-def _first_alike(faces: Integer[np.ndarray, "F 3"], vertex_count: int) -> Integer[np.ndarray, " F"]:
-    """Return for each face the first that has the same three vertices, in whatever order."""
+def _first_alike(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Integer[np.ndarray, " F"]:
+    """Return for each face the first that runs through the same vertices, either way round."""
     # A face's number is the sum of its vertices', which are far apart: faces that are alike have
     # one number, and hardly any others do. Most meshes have no two, and a sort of numbers tells.
     of_vertex: Integer[np.ndarray, " V"] = np.arange(1, vertex_count + 1, dtype=np.uint64)
     of_vertex *= np.uint64(0x9E3779B97F4A7C15)
     of_vertex ^= of_vertex >> np.uint64(29)
     of_vertex *= np.uint64(0xBF58476D1CE4E5B9)
-    number = np.sort(of_vertex[faces[:, 0]] + of_vertex[faces[:, 1]] + of_vertex[faces[:, 2]])
+    number = np.zeros(len(faces), dtype=np.uint64)
+    for column in faces.T:
+        number += of_vertex[column]
+    number.sort()
     if (number[1:] != number[:-1]).all():
         return np.arange(len(faces))
-    corners = np.sort(faces, axis=1)
-    _, first, group = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    return first[group.reshape(-1)]
+    # From the lowest vertex on, towards its lower neighbour.
+    every, degree = np.arange(len(faces))[:, None], faces.shape[1]
+    first: Integer[np.ndarray, " F"] = np.argmin(faces, axis=1)
+    rows = faces[every, (first[:, None] + np.arange(degree)) % degree]
+    back = rows[:, 1] > rows[:, -1]
+    rows[back, 1:] = rows[back, :0:-1]
+    _, leader, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return leader[group.reshape(-1)]
 
 
 def _array(values: object, element: str) -> np.ndarray:

@@ -196,3 +196,8 @@ def _restored(kind: type[ServiceError], state: dict[str, object]) -> ServiceErro
     Exception.__init__(error, state["detail"])
     error.__dict__.update(state)
     return error
+
+
+def printable(text: str) -> str:
+    """Return a line as a terminal may show it: a file's name or content may hold its commands."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

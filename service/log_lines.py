@@ -8,15 +8,30 @@ from __future__ import annotations
 import json
 import logging
 import logging.config
+import re
+import secrets
 import sys
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from typing import Any
-
-from .request_ids import REQUEST_ID
 
 # Of a text, characters; a traceback is the longest that is worth keeping.
 LONGEST = 8_000
 CUT = "…"
+HEADER = b"x-request-id"
+# What may stand in a log, a header and a file name without a thought.
+_SANE = re.compile(rb"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+
+# The id of the request that is being served; a task that is started for it keeps it.
+REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
+
+
+def id_of(headers: list[tuple[bytes, bytes]]) -> str:
+    """Return the id that the client sent, where it is a sane one, else a new one."""
+    sent = [value for name, value in headers if name == HEADER]
+    if len(sent) == 1 and _SANE.fullmatch(sent[0]):
+        return sent[0].decode()
+    return secrets.token_hex(8)
 
 
 class JsonLines(logging.Formatter):

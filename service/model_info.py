@@ -13,8 +13,31 @@ from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL
 from pns_common.model.session import OnnxModel
 
+# What a card holds, by what users call it.
+ROWS = {
+    "format": "format",
+    "features": "features",
+    "gate_sharpness": "gate sharpness c",
+    "budget": "budget C",
+    "orientation": "orientation",
+    "vertex_features": "vertex features",
+    "vertex_gate_sharpness": "vertex gate sharpness c",
+    "base": "base scheme",
+    "prior_strength": "prior strength s",
+    "boundary_strength": "boundary strength b",
+    "network_scale": "network scale τ",
+    "fold_angle": "fold angle θ",
+    "sharpness_levels": "sharpness levels",
+    "sharpness_features": "sharpness features",
+}
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
-METRIC_COLUMNS = ("reference_mean", "method_mean", "percent", "low", "high")
+HEADINGS = {
+    "reference_mean": "Loop",
+    "method_mean": "model",
+    "percent": "improvement %",
+    "low": "95 % from",
+    "high": "to",
+}
 # What models are compared by: short headings, each with its data set and metric.
 HEADLINE_COLUMNS = {
     "near": ("ridge-held-out", "distance_near"),
@@ -50,17 +73,9 @@ def print_models(models: Iterable[OnnxModel]) -> None:
 def print_model(model: OnnxModel) -> None:
     """Print what the file says of itself, and its size and hash."""
     card = model.card
-    rows: dict[str, Any] = {
-        "format": card.format,
-        "features": card.features,
-        "gate sharpness c": card.gate_sharpness,
-        "budget C": card.budget,
-        "orientation": card.orientation,
-        **_further_rows(card),
-        "runs on": ", ".join(model.providers),
-        "bytes": model.size,
-        "sha256": model.hash,
-    }
+    given = {label: getattr(card, name) for name, label in ROWS.items()}
+    rows = {label: value for label, value in given.items() if value is not None}
+    rows |= {"runs on": ", ".join(model.providers), "bytes": model.size, "sha256": model.hash}
     console = Console(soft_wrap=True)
     console.print(_list(model.name, rows))
     for title, data in (("training", card.training), ("metrics", card.metrics)):
@@ -68,83 +83,43 @@ def print_model(model: OnnxModel) -> None:
             console.print(table)
 
 
-def _further_rows(card: ModelCard) -> dict[str, Any]:
-    """Return what the card says of what not every model has."""
-    rows = {
-        "vertex features": card.vertex_features,
-        "vertex gate sharpness c": card.vertex_gate_sharpness,
-        "base scheme": card.base,
-        "prior strength s": card.prior_strength,
-        "boundary strength b": card.boundary_strength,
-        "network scale τ": card.network_scale,
-        "fold angle θ": card.fold_angle,
-        "sharpness levels": card.sharpness_levels,
-        "sharpness features": card.sharpness_features,
-    }
-    return {name: value for name, value in rows.items() if value is not None}
-
-
 def _headline(card: ModelCard) -> list[str]:
     """Return the improvements that models are compared by; a dash for what a card does not hold."""
     shown: list[str] = []
     for dataset, metric in HEADLINE_COLUMNS.values():
-        measured = card.metrics.get(dataset, {})
-        row = measured.get(metric) if _is_measured(measured) else None
+        row = card.metrics.get(dataset, {}).get(metric)
         shown.append("–" if row is None else f"{row['percent']:+.1f}")
     return shown
 
 
 def _tables(title: str, data: Mapping[str, Any]) -> Iterator[Table]:
-    """Yield nested data as tables: single values in a list, rows and columns in a grid."""
-    if _is_measured(data):
-        yield _metrics_table(title, data)
-    elif _is_grid(data):
+    """Yield nested data as tables: single values in a list, rows of the same columns in a grid."""
+    if _is_grid(data):
         yield _grid(title, data)
-    else:
-        inner = {name: value for name, value in data.items() if isinstance(value, Mapping)}
-        single = {name: value for name, value in data.items() if name not in inner}
-        if single:
-            yield _list(title, single)
-        for name, value in inner.items():
-            yield from _tables(f"{title}: {name}", value)
+        return
+    inner = {name: value for name, value in data.items() if isinstance(value, Mapping)}
+    if single := {name: value for name, value in data.items() if name not in inner}:
+        yield _list(title, single)
+    for name, value in inner.items():
+        yield from _tables(f"{title}: {name}", value)
 
 
-def _is_measured(value: Any) -> bool:
-    """Return whether a card's metric is a table of rows as this project's export writes them."""
-    return _is_grid(value, most=None) and all(
-        set(METRIC_COLUMNS) <= set(row) for row in value.values()
-    )
-
-
-def _is_grid(value: Any, most: int | None = WIDEST_GRID) -> bool:
-    """Return whether it is rows by name, with the same columns of single values in each."""
-    if not isinstance(value, Mapping) or not value:
-        return False
-    rows = list(value.values())
-    if not all(isinstance(row, Mapping) and list(row) == list(rows[0]) for row in rows):
+def _is_grid(data: Mapping[str, Any]) -> bool:
+    rows = list(data.values())
+    if not rows or not all(isinstance(row, Mapping) and list(row) == list(rows[0]) for row in rows):
         return False
     if any(isinstance(cell, Mapping | list) for row in rows for cell in row.values()):
         return False
-    return len(rows[0]) > 0 and (most is None or len(rows[0]) <= most)
-
-
-def _metrics_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
-    headings = ("Loop", "model", "improvement %", "95 % from", "to")
-    named = dict(zip(METRIC_COLUMNS, headings, strict=True))
-    cells = {
-        metric.replace("_", ", "): {heading: row[column] for column, heading in named.items()}
-        for metric, row in rows.items()
-    }
-    return _grid(title, cells)
+    return 0 < len(rows[0]) <= WIDEST_GRID
 
 
 def _grid(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     table = Table(title=title, title_justify="left")
     table.add_column()
     for heading in next(iter(rows.values())):
-        table.add_column(heading, justify="right")
+        table.add_column(HEADINGS.get(heading, heading), justify="right")
     for name, row in rows.items():
-        table.add_row(name, *(_text(value) for value in row.values()))
+        table.add_row(name.replace("_", ", "), *(_text(value) for value in row.values()))
     return table
 
 

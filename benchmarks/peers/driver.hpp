@@ -16,6 +16,15 @@
 #include <string>
 #include <vector>
 
+// What OpenSubdiv asks of points. Its weights are single precision where it is not told otherwise.
+struct Point {
+    double x[3];
+    void Clear(void* = nullptr) { x[0] = x[1] = x[2] = 0; }
+    void AddWithWeight(const Point& from, double weight) {
+        for (int k = 0; k < 3; ++k) x[k] += weight * from.x[k];
+    }
+};
+
 struct Arrays {
     std::vector<double> points;
     std::vector<int32_t> faces;

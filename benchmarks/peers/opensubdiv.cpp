@@ -8,15 +8,6 @@
 
 using namespace OpenSubdiv;
 
-struct Point {
-    double x[3];
-    void Clear(void* = nullptr) { x[0] = x[1] = x[2] = 0; }
-    // The library's weights are single precision.
-    void AddWithWeight(const Point& from, double weight) {
-        for (int k = 0; k < 3; ++k) x[k] += weight * from.x[k];
-    }
-};
-
 Arrays subdivide(const Arrays& in, int levels) {
     using Descriptor = Far::TopologyDescriptor;
     using Factory = Far::TopologyRefinerFactory<Descriptor>;

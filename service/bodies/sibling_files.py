@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from unicodedata import normalize
 from urllib.parse import unquote
 
@@ -115,3 +117,19 @@ def relative_name(path: str) -> str | None:
     if not steps or ".." in steps or ":" in steps[0]:
         return None
     return "/".join(steps)
+
+
+def folder_of(document: Path) -> SiblingFiles:
+    """Return what lies beside a file; links that lead out of its folder are not followed."""
+    return SiblingFiles(partial(_find, document.parent.resolve()))
+
+
+def _find(folder: Path, name: str) -> File | None:
+    try:
+        path = (folder / name).resolve()
+        if not path.is_relative_to(folder) or not path.is_file():
+            return None
+    except OSError:
+        # A name that no file can have, such as a very long one.
+        return None
+    return File(name, path.read_bytes())

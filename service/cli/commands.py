@@ -6,12 +6,13 @@ declares and does not read itself, `options_of` takes from the context.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..printable import printable
+from ..errors import printable
 from .errors import FAILURE, explained
 from .parameters import (
     AddressOption,
@@ -22,7 +23,7 @@ from .parameters import (
     options_of,
     takes_options,
 )
-from .systems import check_posix
+from .stops import check_posix
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -156,7 +157,8 @@ def batch(
     from rich.console import Console
 
     from ..scale.batch import Batch, batch_work, run_batch
-    from ..scale.engines.named import engine_of
+    from ..scale.engines.local import local
+    from ..scale.engines.on_ray import on_ray
     from ..scale.told import print_summary
     from ..settings import Settings
     from .stops import stoppable
@@ -174,7 +176,10 @@ def batch(
     )
     work = batch_work(settings.job_seconds)
     console = Console(stderr=True, soft_wrap=True, highlight=False)
-    where = engine_of(work, engine, address, workers, console.print)
+    if engine == "ray" or address is not None:
+        where = on_ray(work, address, workers, console.print)
+    else:
+        where = local(work, workers or os.cpu_count() or 1)
     with stoppable(console):
         summary = run_batch(chosen, where, console)
     print_summary(summary, console)

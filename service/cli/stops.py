@@ -1,14 +1,31 @@
-"""Runs that are stopped, by Ctrl-C, SIGTERM or a terminal that closes: they end in order, and say
-how to go on."""
+"""Commands on POSIX systems alone, and runs that are stopped, by Ctrl-C, SIGTERM or a terminal that
+closes: they end in order, and say how to go on."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from types import FrameType
+from typing import TYPE_CHECKING
 
-from rich.console import Console
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def check_posix(command: str) -> None:
+    """Raise StartError where there are no locks, signals and process sessions of POSIX.
+
+    By these workers are ended, and a folder of work is kept from a second run.
+    """
+    from ..settings import StartError
+
+    if find_spec("fcntl") is None:
+        raise StartError(
+            f"pns {command} needs a POSIX system: Linux, macOS, or, on Windows, WSL or the "
+            "container; pns subdivide needs none"
+        )
 
 
 @contextmanager

@@ -14,18 +14,18 @@ from ..course import Course
 from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
-from .read.container import write_glb
-from .read.json_text import encode
+from .read.container import encode, write_glb
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
 from .read.plan import BYTES_PER_FACE as BYTES_PER_FACE_OF_MESH
 from .read.references import mesh_instances
 from .read.upload import Media, Upload, read_upload
 from .refine.meshes import mostly_polygons, refined_meshes
 from .write.compression import BYTES_PER_FACE, WRITERS
-from .write.parents import Arrays, parents_of_mesh
 from .write.prune import VertexUse
 from .write.storage import (
+    Arrays,
     leave_out_ngons,
+    parents_of_mesh,
     put_report,
     remove_replaced,
     replaces_extras,

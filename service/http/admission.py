@@ -46,16 +46,14 @@ class Admission:
         """
         if self.draining:
             raise DrainingError("no new request is taken", retry_after=5)
-        with self._uploads.slot():
-            async with self._uploads.until_ended():
-                yield
+        async with self._uploads.held():
+            yield
 
     @asynccontextmanager
     async def working(self) -> AsyncIterator[None]:
         """Be under way, until `end` says otherwise. Raises DrainingError."""
-        with self._jobs.slot():
-            async with self._jobs.until_ended():
-                yield
+        async with self._jobs.held():
+            yield
 
     @asynccontextmanager
     async def answering(self, client: str, size: int) -> AsyncIterator[None]:
@@ -221,24 +219,20 @@ class _Places:
         self._ends: set[asyncio.Timeout] = set()
         self.taken = 0
 
-    @contextmanager
-    def slot(self) -> Iterator[None]:
+    @asynccontextmanager
+    async def held(self) -> AsyncIterator[None]:
         if self._count is not None and self.taken >= self._count:
             raise BusyError(f"{self.taken} {self._name} are under way; no more fit")
         self.taken += 1
         try:
-            yield
+            async with _until_told(_ended) as end:
+                self._ends.add(end)
+                try:
+                    yield
+                finally:
+                    self._ends.discard(end)
         finally:
             self.taken -= 1
-
-    @asynccontextmanager
-    async def until_ended(self) -> AsyncIterator[None]:
-        async with _until_told(_ended) as end:
-            self._ends.add(end)
-            try:
-                yield
-            finally:
-                self._ends.discard(end)
 
     def end(self) -> None:
         while self._ends:

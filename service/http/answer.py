@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
 
+from fastapi import Request
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from ..bodies import media
 from ..workers.memory_file import MemoryFile
 from .admission import Admission, CutOffError, DrainingError
-from .leaving import until_gone
 
 log = logging.getLogger("pns.service")
+
+
+T = TypeVar("T")
 
 
 class FileAnswer(Response):
@@ -88,3 +94,40 @@ class FileAnswer(Response):
             leaves.cancel()
         # Who has all may leave before it is told that nothing follows.
         return left == 0
+
+
+async def unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:
+    """Return the value of `work`, cancelled if the client disconnects. Raises ClientDisconnect."""
+    job = asyncio.create_task(work)
+    gone = asyncio.create_task(until_gone(receive))
+    try:
+        await asyncio.wait({job, gone}, return_when=asyncio.FIRST_COMPLETED)
+        if not job.done():
+            raise ClientDisconnect
+        return job.result()
+    finally:
+        job.cancel()
+        gone.cancel()
+        await asyncio.gather(job, gone, return_exceptions=True)
+
+
+async def until_gone(receive: Receive) -> None:
+    """Wait until the client has left; the body has been read."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def answer_type(request: Request, file_type: str = media.GLB) -> str:
+    """Return the media type that the client wants most; `file_type` is that of the file.
+
+    Generated clients know a file by `application/octet-stream` alone, and may ask for that.
+    """
+    # Several lines of it are one; without any, all are equal.
+    accept = ",".join(request.headers.getlist("accept"))
+    # In the order of preference among equals.
+    return max((file_type, media.JSON, media.BYTES), key=lambda kind: media.quality(kind, accept))
+
+
+def server_timing(seconds: dict[str, float]) -> str:
+    """Return the value of `Server-Timing`: milliseconds by stage."""
+    return ", ".join(f"{stage};dur={1000 * value:.1f}" for stage, value in seconds.items())

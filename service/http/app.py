@@ -23,18 +23,18 @@ from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
 from ..workers.pool import Workers
 from ..workers.turns import Lane, Turns
-from . import layers, openapi, pages, problems, result_room, routes
+from . import layers, openapi, pages, problems, routes
 from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
-from .catalogue import ReadOnce
 from .jobs import routes as job_routes
 from .jobs import work as job_work
 from .jobs.book import JobBook
 from .jobs.room import Room
 from .jobs.shared import SharedJobs
 from .jobs.store import JobStore
-from .service import Service
+from .room import with_results_that_fit
+from .service import ReadOnce, Service
 from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 
@@ -65,7 +65,7 @@ def create_app(
     work. Raises KeysError where the file of keys cannot be used, TracingError where traces cannot
     be sent.
     """
-    settings = result_room.fitting(settings or Settings())
+    settings = with_results_that_fit(settings or Settings())
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
     workers = {
@@ -166,7 +166,7 @@ def create_app(
     )
     app.include_router(routes.router(service))
     app.include_router(job_routes.router(service))
-    app.openapi = openapi.Description(app)  # type: ignore[method-assign]
+    app.openapi = openapi.described(app.openapi)  # type: ignore[method-assign]
     app.include_router(pages.router(settings.prefix))
     return app
 

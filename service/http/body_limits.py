@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..errors import ServiceError, UnreadableError, check_limit
 from . import problems
-from .pace import Pace
 
 
 class UploadTimeoutError(ServiceError):
@@ -81,3 +81,32 @@ class BodyLimit:
             return message
 
         return counted
+
+
+@dataclass(frozen=True)
+class Pace:
+    """A least rate with three bounds on waiting; times in seconds, the rate in bytes a second.
+
+    `rate` need not be kept from the first byte on: `grace` is how far a client may fall behind.
+    """
+
+    rate: float
+    grace: float
+    idle: float
+    whole: float
+
+    def patience(self, moved: int, waited: float) -> float:
+        """Return how many more seconds to wait for the next byte.
+
+        `moved` bytes have been moved so far, and the client was waited for `waited` seconds in all.
+        Never more than `idle`; zero or less once the client is late.
+        """
+        return min(self.idle, self.grace + moved / self.rate - waited, self.whole - waited)
+
+    def excuse(self, moved: int, waited: float) -> str:
+        """Return what the client that ran out of patience has done."""
+        if waited >= self.whole:
+            return f"not whole within {self.whole:g} seconds"
+        if waited >= self.grace + moved / self.rate:
+            return f"slower than {self.rate:g} bytes a second"
+        return f"nothing for {self.idle:g} seconds"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from ipaddress import IPv6Address, ip_address, ip_network
 
 from fastapi import Request
 
 from ..settings import Settings
-from .addresses import sites
+
+# One subscriber of IPv6 is given a /64 at least, often a /56, and a site a /48.
+IPV6_NETWORKS = (64, 56, 48)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,3 +42,16 @@ def client_of(request: Request, settings: Settings) -> Client:
     host = "" if request.client is None else request.client.host
     networks = tuple(f"address:{network}" for network in sites(host))
     return Client(networks[0], settings.faces_per_minute, networks=networks)
+
+
+def sites(address: str) -> tuple[str, ...]:
+    """Return the networks whose shares an address counts for, the narrowest first."""
+    try:
+        parsed = ip_address(address)
+    except ValueError:
+        return (address,)
+    if not isinstance(parsed, IPv6Address):
+        return (address,)
+    if parsed.ipv4_mapped:
+        return (str(parsed.ipv4_mapped),)
+    return tuple(str(ip_network((int(parsed), length), strict=False)) for length in IPV6_NETWORKS)

@@ -8,40 +8,31 @@ from ..bodies import media
 from . import problems
 from .problems import Problem
 
-_BINARY = {"schema": {"type": "string", "format": "binary"}}
+
+def _binary(**more: str) -> dict[str, Any]:
+    return {"schema": {"type": "string", "format": "binary"} | more}
+
 
 _BODY = {
     "required": True,
     "content": {
-        media.GLB: _BINARY,
+        media.GLB: _binary(),
         media.GLTF: {
             "schema": {"type": "object", "description": "glTF 2.0 with embedded (data:) buffers"}
         },
-        **{kind: _BINARY for kind in media.FORMATS if kind not in (media.GLB, media.GLTF)},
-        media.BYTES: {
-            "schema": {
-                "type": "string",
-                "format": "binary",
-                "description": "a GLB, glTF JSON or an archive of one, told by its first bytes",
-            }
-        },
-        media.ZIP: {
-            "schema": {
-                "type": "string",
-                "format": "binary",
-                "description": "one .gltf or .glb, and the files that it names",
-            }
-        },
+        **{kind: _binary() for kind in media.FORMATS if kind not in (media.GLB, media.GLTF)},
+        media.BYTES: _binary(
+            description="a GLB, glTF JSON or an archive of one, told by its first bytes"
+        ),
+        media.ZIP: _binary(description="one .gltf or .glb, and the files that it names"),
         media.MULTIPART: {
             "schema": {
                 "type": "object",
                 "required": ["file"],
-                "properties": {"file": {"type": "string", "format": "binary"}},
-                "additionalProperties": {
-                    "type": "string",
-                    "format": "binary",
-                    "description": "a file that the document names, under that name",
-                },
+                "properties": {"file": _binary()["schema"]},
+                "additionalProperties": _binary(
+                    description="a file that the document names, under that name"
+                )["schema"],
             }
         },
     },
@@ -52,21 +43,21 @@ def _named(schema: str) -> dict[str, str]:
     return {"$ref": f"#/components/schemas/{schema}"}
 
 
-def _problems(**reasons: str) -> dict[int | str, dict[str, Any]]:
+def _json(schema: str) -> dict[str, Any]:
+    return {"content": {media.JSON: {"schema": _named(schema)}}}
+
+
+def problem(reason: str) -> dict[str, Any]:
+    """Return the description of an answer that is a problem."""
     return {
-        int(status.removeprefix("_")): {
-            "description": reason,
-            "content": {problems.MEDIA_TYPE: {"schema": _named("Problem")}},
-        }
-        for status, reason in reasons.items()
+        "description": reason,
+        "content": {problems.MEDIA_TYPE: {"schema": _named("Problem")}},
     }
 
 
-_REPORT = {
-    "type": "object",
-    "description": "what was done, in numbers",
-    "additionalProperties": True,
-}
+def _problems(**reasons: str) -> dict[int | str, dict[str, Any]]:
+    return {int(status[1:]): problem(reason) for status, reason in reasons.items()}
+
 
 _SERVER_TIMING = {
     "Server-Timing": {"description": "milliseconds of each stage", "schema": {"type": "string"}}
@@ -75,7 +66,7 @@ _SERVER_TIMING = {
 _FILE = {
     "description": "The refined file",
     # Plain bytes first: generators take the first kind that they know.
-    "content": {media.BYTES: _BINARY, media.GLB: _BINARY},
+    "content": {media.BYTES: _binary(), media.GLB: _binary()},
     "headers": _SERVER_TIMING,
 }
 
@@ -109,13 +100,7 @@ REPORT: dict[str, Any] = SUBDIVIDE | {
     "summary": "The report of a refinement, without its file",
     "description": "Parameters and bodies are those of `POST /subdivide`.",
     "responses": SUBDIVIDE["responses"]
-    | {
-        200: {
-            "description": "The report",
-            "content": {media.JSON: {"schema": _named("Report")}},
-            "headers": _SERVER_TIMING,
-        }
-    },
+    | {200: {"description": "The report", "headers": _SERVER_TIMING, **_json("Report")}},
 }
 
 MODELS: dict[str, Any] = {
@@ -152,9 +137,6 @@ JOB_FIELDS: dict[str, Any] = {
     },
 }
 
-_JOB = {"type": "object", "required": list(JOB_FIELDS), "properties": JOB_FIELDS}
-
-_JOB_ANSWER = {"content": {media.JSON: {"schema": _named("Job")}}}
 _UNKNOWN = "No job has this id, or its result is no longer kept"
 
 JOBS: dict[str, Any] = SUBDIVIDE | {
@@ -167,7 +149,7 @@ JOBS: dict[str, Any] = SUBDIVIDE | {
         202: {
             "description": "The job",
             "headers": {"Location": {"schema": {"type": "string"}}},
-            **_JOB_ANSWER,
+            **_json("Job"),
         },
         **{code: response for code, response in SUBDIVIDE["responses"].items() if code != 200},
     },
@@ -175,7 +157,7 @@ JOBS: dict[str, Any] = SUBDIVIDE | {
 
 JOB: dict[str, Any] = {
     "summary": "How far a job is",
-    "responses": {200: {"description": "The job", **_JOB_ANSWER}, **_problems(_404=_UNKNOWN)},
+    "responses": {200: {"description": "The job", **_json("Job")}, **_problems(_404=_UNKNOWN)},
 }
 
 EVENTS: dict[str, Any] = {
@@ -216,8 +198,12 @@ JOB_REPORT: dict[str, Any] = {
 # The schemas that the routes above name.
 SCHEMAS: dict[str, dict[str, Any]] = {
     "Problem": Problem.model_json_schema(),
-    "Job": _JOB,
-    "Report": _REPORT,
+    "Job": {"type": "object", "required": list(JOB_FIELDS), "properties": JOB_FIELDS},
+    "Report": {
+        "type": "object",
+        "description": "what was done, in numbers",
+        "additionalProperties": True,
+    },
 }
 
 DELETE_JOB: dict[str, Any] = {

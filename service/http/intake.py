@@ -8,20 +8,20 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fastapi import Request
 
 from ..bodies import media
-from ..bodies.encodings import encoding_of
+from ..bodies.media import encoding_of
 from ..errors import InvalidParameter, check_limit
-from ..options import Options
-from ..request_ids import REQUEST_ID
+from ..log_lines import REQUEST_ID
 from ..settings import Settings
 from ..workers.job import Job
 from ..workers.jobs import Work
 from ..workers.memory_file import MemoryFile
 from ..workers.progress import ProgressPage
-from .clients import Client, client_of
+from .clients import client_of
 from .parameters import Parameters
 from .service import Service
 
@@ -37,19 +37,6 @@ class Wanted:
     report: bool
     folder: Path | None
     patience: float
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """Parameters of a job beside its body; another replica may make it again."""
-
-    client: str
-    options: Options
-    model: str | None
-    target: media.Kind
-    content_type: str
-    encoding: str
-    request_id: str | None
 
 
 @asynccontextmanager
@@ -84,8 +71,11 @@ async def taken_in(
                 async for piece in request.stream():
                     counted.grow(len(piece))
                     body.append(piece)
-            asked = Asked(
-                client=client.id,
+            job = made_of(
+                settings,
+                body,
+                wanted,
+                client.id,
                 options=options,
                 model=parameters.model,
                 target=parameters.format,
@@ -93,7 +83,6 @@ async def taken_in(
                 encoding=encoding,
                 request_id=REQUEST_ID.get(),
             )
-            job = made_of(settings, asked, body, wanted)
             # From here on the body is the job's.
             files.pop_all()
         job.faces_per_minute = client.faces_per_minute
@@ -103,8 +92,11 @@ async def taken_in(
         yield job
 
 
-def made_of(settings: Settings, asked: Asked, body: MemoryFile, wanted: Wanted) -> Job:
-    """Make the job of a body that is there, with the files that it fills. Raises NoStorageError."""
+def made_of(settings: Settings, body: MemoryFile, wanted: Wanted, client: str, **asked: Any) -> Job:
+    """Make the job of a body that is there, with the files that it fills.
+
+    `asked` are the fields of `Work` that a request names. Raises NoStorageError.
+    """
     with ExitStack() as files:
         page = files.enter_context(ProgressPage())
         answer = files.enter_context(MemoryFile(wanted.folder)) if wanted.answer else None
@@ -114,19 +106,14 @@ def made_of(settings: Settings, asked: Asked, body: MemoryFile, wanted: Wanted) 
             answer=None if answer is None else answer.name,
             report=None if report is None else report.name,
             page=page.file.name,
-            content_type=asked.content_type,
-            options=asked.options,
-            model=asked.model,
-            target=asked.target,
             limits=settings.job_limits(),
             answer_bytes=None if wanted.folder is None else int(settings.result_bytes),
-            request_id=asked.request_id,
-            encoding=asked.encoding,
             body_bytes=int(settings.body),
+            **asked,
         )
         files.pop_all()
     return Job(
-        client=asked.client,
+        client=client,
         faces_per_minute=None,
         work=work,
         body=body,
@@ -136,25 +123,6 @@ def made_of(settings: Settings, asked: Asked, body: MemoryFile, wanted: Wanted) 
         upload_seconds=0.0,
         must_end=time.monotonic() + wanted.patience,
     )
-
-
-def asked_of(job: Job) -> Asked:
-    """Return what a job was made of beside its body."""
-    work = job.work
-    return Asked(
-        client=job.client,
-        options=work.options,
-        model=work.model,
-        target=work.target,
-        content_type=work.content_type,
-        encoding=work.encoding,
-        request_id=work.request_id,
-    )
-
-
-def owner_of(client: Client) -> str | None:
-    """Return who alone may see what a client makes; None: everybody who knows its id."""
-    return client.id if client.named else None
 
 
 def _refuse_repeated(request: Request) -> None:

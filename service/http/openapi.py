@@ -6,13 +6,13 @@ operation; a file as `application/octet-stream`; one kind of answer for one oper
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
-from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from . import documentation
-from .problems import MEDIA_TYPE
 
 # What every route may answer, whatever it is asked; the rest is with the routes.
 EVERYWHERE = {
@@ -46,18 +46,9 @@ def operation_id(route: APIRoute) -> str:
     return route.name
 
 
-class Description:
-    """Makes the document once, when it is first asked for; FastAPI calls it for /openapi.json."""
-
-    def __init__(self, app: FastAPI) -> None:
-        self._make = app.openapi
-        self._document: dict[str, Any] | None = None
-
-    def __call__(self) -> dict[str, Any]:
-        """Return the document."""
-        if self._document is None:
-            self._document = _described(self._make())
-        return self._document
+def described(make: Callable[[], dict[str, Any]]) -> Callable[[], dict[str, Any]]:
+    """Return what makes the document, once: FastAPI calls it for /openapi.json."""
+    return cache(lambda: _described(make()))
 
 
 def _described(document: dict[str, Any]) -> dict[str, Any]:
@@ -73,7 +64,7 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
             if OPEN_TAG not in operation.get("tags", ()):
                 also = {} if method == "get" else ASKED_FOR_WORK
                 for status, text in (EVERYWHERE | also).items():
-                    responses.setdefault(status, _problem(text))
+                    responses.setdefault(status, documentation.problem(text))
                 operation["security"] = [{}, {"key": []}]
             else:
                 # Nobody needs a key.
@@ -91,8 +82,3 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
         }
     }
     return document
-
-
-def _problem(text: str) -> dict[str, Any]:
-    schema = {"$ref": "#/components/schemas/Problem"}
-    return {"description": text, "content": {MEDIA_TYPE: {"schema": schema}}}

@@ -19,7 +19,7 @@ from starlette.routing import Match
 from starlette.types import Receive, Scope, Send
 
 from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
-from ..request_ids import REQUEST_ID
+from ..log_lines import REQUEST_ID
 from ..workers.worker import JobFaultError
 from .parameters import Parameters
 

@@ -7,7 +7,9 @@ import logging
 import os
 import signal
 import socket
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context
 from types import FrameType
 from typing import Any
@@ -19,12 +21,10 @@ from .. import log_lines
 from ..errors import NoModelError
 from ..settings import Settings, StartError
 from ..workers.jobs import hold_model
-from . import descriptors
 from .admission import Admission
 from .app import create_app
-from .prompt_server import PromptServer
-from .watch.metrics import Metrics
-from .watch.scrapes import scrapes
+from .room import BEYOND, connections_that_fit
+from .watch.metrics import Metrics, scrapes
 
 log = logging.getLogger("pns.service")
 
@@ -38,6 +38,77 @@ WAITING, A_TURN = 2048, 32
 HEAD_BYTES = 16 * 1024
 # Connections to the metrics.
 MOST_SCRAPERS = 16
+# Of uvicorn's settings, for the service and for its metrics.
+ALIKE: dict[str, Any] = {
+    # The other parser bounds no head.
+    "http": "h11",
+    "h11_max_incomplete_event_size": HEAD_BYTES,
+    "ws": "none",
+    "server_header": False,
+    # Its loggers are configured with ours, and the journal says what an access log would.
+    "log_config": None,
+    "access_log": False,
+    "timeout_graceful_shutdown": FLUSH_SECONDS,
+}
+
+
+class PromptServer(uvicorn.Server):
+    """A server whose idle connections end in time.
+
+    A connection is idle while it has no request under way: nothing was sent, or half a head, or it
+    rests after an answer. It ends `head_seconds` later; where there are more than `most`
+    connections, those that are idle for longest end at once. One whose client still takes its
+    answer is idle once it takes none of it any more.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        head_seconds: float,
+        most: int,
+        listening: list[socket.socket] | None = None,
+    ) -> None:
+        super().__init__(config)
+        self.listening = listening
+        self._head_seconds = head_seconds
+        self._most = most
+        # By connection: since when it is idle, after which request, and what of its answer its
+        # client has not taken yet, in bytes.
+        self._idle: dict[Any, tuple[float, Any, int]] = {}
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals to another server of this process."""
+        yield
+
+    async def serve(self, sockets: list[socket.socket] | None = None) -> None:
+        """Serve on the sockets that it was made with, or as its configuration says."""
+        await super().serve(sockets or self.listening)
+
+    async def on_tick(self, counter: int) -> bool:
+        """End idle connections, ten times a second."""
+        self._end_idle(asyncio.get_running_loop().time())
+        return await super().on_tick(counter)
+
+    def _end_idle(self, now: float) -> None:
+        connections = self.server_state.connections
+        before, self._idle = self._idle, {}
+        for connection in connections:
+            # Of the one protocol that is served here.
+            cycle: Any = getattr(connection, "cycle", None)
+            closing = connection.transport.is_closing()
+            if closing or cycle is None or cycle.response_complete:
+                untaken = connection.transport.get_write_buffer_size()
+                since, last, left = before.get(connection, (now, cycle, untaken))
+                rests = last is cycle and left == untaken
+                self._idle[connection] = (since if rests else now, cycle, untaken)
+        too_many = len(connections) - self._most
+        oldest = sorted(self._idle, key=lambda connection: self._idle[connection][0])
+        for number, connection in enumerate(oldest):
+            waited = now - self._idle[connection][0]
+            # One that has just come may have sent its head.
+            if waited >= self._head_seconds or (number < too_many and waited > 0):
+                connection.transport.abort()
 
 
 class DrainingServer(PromptServer):
@@ -55,7 +126,7 @@ class DrainingServer(PromptServer):
     def __init__(
         self, app: FastAPI, settings: Settings, beside: uvicorn.Server | None = None
     ) -> None:
-        most = descriptors.fitting(settings)
+        most = connections_that_fit(settings)
         super().__init__(configuration(app, settings, most), settings.head_seconds, most)
         metrics: Metrics = app.state.metrics
         metrics.gauge("pns_connections", "Open connections", self.count)
@@ -147,7 +218,7 @@ def serve(settings: Settings) -> None:
         check_model(settings)
         log_lines.configure()
         app = create_app(settings)
-        server = DrainingServer(app, settings, _metrics_server(app.state.metrics, settings))
+        server = DrainingServer(app, settings, metrics_server(app.state.metrics, settings))
     # Under nohup the signal stays ignored.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
@@ -181,7 +252,7 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
         raise StartError(f"{what}{reason}{where}; {hint}") from error
 
 
-def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | None:
+def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     """Return what serves the metrics, where they have a port. Raises StartError."""
     host, wanted = settings.metrics_host, settings.metrics_port
     if wanted is None:
@@ -189,18 +260,7 @@ def _metrics_server(metrics: Metrics, settings: Settings) -> uvicorn.Server | No
     hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
     listening = _listening(host, wanted, hint, f"metrics on {host}:{wanted}: ")
     log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
-    config = uvicorn.Config(
-        scrapes(metrics.registry),
-        http="h11",
-        lifespan="off",
-        ws="none",
-        proxy_headers=False,
-        server_header=False,
-        log_config=None,
-        access_log=False,
-        h11_max_incomplete_event_size=HEAD_BYTES,
-        timeout_graceful_shutdown=FLUSH_SECONDS,
-    )
+    config = uvicorn.Config(scrapes(metrics.registry), lifespan="off", proxy_headers=False, **ALIKE)
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
@@ -210,18 +270,10 @@ def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config
         app,
         host=settings.host,
         port=settings.port,
-        # The other parser bounds no head.
-        http="h11",
-        h11_max_incomplete_event_size=HEAD_BYTES,
-        ws="none",
         proxy_headers=bool(settings.proxies),
         forwarded_allow_ips=[str(network) for network in settings.proxies],
-        server_header=False,
-        limit_concurrency=most + descriptors.BEYOND,
+        limit_concurrency=most + BEYOND,
         backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
-        # Its loggers are configured with ours, and the journal says what an access log would.
-        log_config=None,
-        access_log=False,
-        timeout_graceful_shutdown=FLUSH_SECONDS,
+        **ALIKE,
     )

@@ -22,16 +22,14 @@ from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.model.session import Model
 from pns_common.schemes import Scheme
 
-from ..bodies.folder import folder_of
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
-from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..bodies.sibling_files import ALONE, SiblingFiles, folder_of
 from ..course import Course
-from ..errors import InvalidParameter, ServiceError
+from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
-from ..gltf.write.parents import Arrays, matrix_arrays
+from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import Limits, Options
-from ..printable import printable
 from ..report import Change
 from .flatten import flatten
 from .formats import FORMATS, held, read_within

@@ -8,14 +8,12 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from ..errors import UnreadableError
-from . import stl
+from . import off, stl
 from .ply import POLYGON, ply_header
 from .text import count_words, plain_letters, plain_text
 
 # Of what tells no counts, and will hardly be read.
 BYTES_PER_FACE = 30
-# A facet of an STL as text: a normal, three vertices, and the words that name and enclose them.
-WORDS_PER_FACET = 21
 # What is cut into words in one go, which takes many times its size.
 PIECE = 2**18
 # Each corner beyond the second makes a triangle; a keyword or a count stands before them.
@@ -32,14 +30,15 @@ def count_triangles(data: bytes, kind: str) -> int:
     """
     if kind == "stl":
         text = stl.is_text(data)
-        return count_words(data) // WORDS_PER_FACET if text else stl.count_facets(data)
+        return count_words(data) // stl.WORDS_PER_FACET if text else stl.count_facets(data)
     if kind == "ply":
         return _of_ply(data)
     text = plain_text(data)
     if kind == "obj":
         return sum(_triangles(words[firsts == ord("f")]) for words, firsts in _lines(text))
     start = plain_letters(text[:START], continued=False)[0].tobytes()
-    numbers = start.partition(b"OFF")[2].split(maxsplit=2)[:2]
+    header = off.HEADER.match(start)
+    numbers = start[header.end() :].split(maxsplit=2)[:2] if header else []
     if len(numbers) == 2 and numbers[1].isdigit():
         return _in_last_lines(text, int(numbers[1]))
     return len(data) // BYTES_PER_FACE

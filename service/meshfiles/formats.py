@@ -13,7 +13,7 @@ from pns_common.rows import distinct_rows, marked
 
 from ..errors import UnreadableError, UnrefinableError
 from ..gltf.read.plan import check_memory
-from ..meshes.far_from_origin import STEPS, faces_too_far
+from ..gltf.refine.changes import STEPS, faces_too_far
 from ..meshes.weld import canonical_zero
 from ..options import Limits
 from ..report import Change
@@ -163,7 +163,7 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         for name, layer in mesh.layers.items()
         if (form.layers is None or name in form.layers)
         # An OBJ names values corner by corner, but for colours.
-        and (layer.complete or (kind == "obj" and name != COLOUR))
+        and ((layer.rows >= 0).all() or (kind == "obj" and name != COLOUR))
     }
     lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
     if kind == "obj" and COLOUR in layers:

@@ -16,8 +16,7 @@ from jaxtyping import Int
 from ..bodies.sibling_files import Opened, SiblingFiles
 from ..course import Course
 from ..gltf.constants import COMPONENT_TYPES, FLOAT, NGONS, UNSIGNED_INT
-from ..gltf.read.container import read_glb, write_glb
-from ..gltf.read.json_text import decode_object, encode
+from ..gltf.read.container import decode_object, encode, read_glb, write_glb
 from ..gltf.read.resources import embed_images
 from ..gltf.read.schema import Accessor, view
 from ..gltf.refine.attributes import Columns, RefinedPrimitive
@@ -187,7 +186,8 @@ def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:
 def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
     """Return faces' colours as their corners', which is all that a glTF has; return what goes."""
     lost = {f"face property {name}": len(own) for name, own in mesh.face_values.items()}
-    lost.pop(f"face property {COLOUR}", None)
+    if lost.pop(f"face property {COLOUR}", 0) and COLOUR in mesh.layers:
+        lost["colours of faces, as vertices have some,"] = len(mesh.sizes)
     lost |= {f"{kind}s": len(own.names) for kind, own in mesh.labels.items() if kind != MATERIAL}
     why = "dropped: not written to GLB files"
     changes = [Change("", f"{what} {why}", count) for what, count in lost.items()]

@@ -31,11 +31,6 @@ class Layer:
     values: Shaped[np.ndarray, "N K"]
     rows: Int[np.ndarray, " C"]
 
-    @property
-    def complete(self) -> bool:
-        """True where every corner has a value."""
-        return bool((self.rows >= 0).all())
-
 
 @dataclass(frozen=True, eq=False)
 class Labels:
@@ -44,9 +39,10 @@ class Labels:
     names: tuple[str, ...]
     of_face: Int[np.ndarray, " F"]
 
-    def named(self, name: str) -> Bool[np.ndarray, " F"]:
-        """Return which faces have a name."""
-        return self.of_face == (self.names.index(name) if name in self.names else NONE - 1)
+    def named(self, name: str, *, words: bool = False) -> Bool[np.ndarray, " F"]:
+        """Return which faces have a name; with `words`, or one of several between blanks."""
+        own = [name == each or (words and name in each.split()) for each in self.names]
+        return np.array([*own, False])[self.of_face]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,24 +89,21 @@ class MeshFile:
 
     def of_faces(self, keep: Bool[np.ndarray, " F"]) -> MeshFile:
         """Return a copy of some of its faces."""
-        corner = np.repeat(keep, self.sizes)
-        return replace(
-            self,
-            offsets=offsets_of(self.sizes[keep]),
-            corners=self.corners[corner],
-            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
-            face_values={name: values[keep] for name, values in self.face_values.items()},
-            labels={k: Labels(own.names, own.of_face[keep]) for k, own in self.labels.items()},
-        )
+        return self._taken(offsets_of(self.sizes[keep]), np.repeat(keep, self.sizes), keep)
 
     def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
         """Return the triangles of its faces, by the places of their corners and by their face."""
-        flat = places.reshape(-1)
+        return self._taken(np.arange(0, places.size + 1, 3), places.reshape(-1), face)
+
+    def _taken(
+        self, offsets: Int[np.ndarray, " G1"], corner: np.ndarray, face: np.ndarray
+    ) -> MeshFile:
+        """Return some corners as faces that begin at `offsets` and are parts of some faces."""
         return replace(
             self,
-            offsets=np.arange(0, len(flat) + 1, 3),
-            corners=self.corners[flat],
-            layers={name: Layer(own.values, own.rows[flat]) for name, own in self.layers.items()},
+            offsets=offsets,
+            corners=self.corners[corner],
+            layers={name: Layer(own.values, own.rows[corner]) for name, own in self.layers.items()},
             face_values={name: values[face] for name, values in self.face_values.items()},
             labels={k: Labels(own.names, own.of_face[face]) for k, own in self.labels.items()},
         )
@@ -138,6 +131,14 @@ def shown(layer: str) -> str:
 def as_fractions(values: np.ndarray) -> np.ndarray:
     """Return colours as fractions of 1, whatever type stores them."""
     return values / np.iinfo(values.dtype).max if values.dtype.kind in "ui" else values
+
+
+def colours_of(values: np.ndarray) -> np.ndarray:
+    """Return colours as fractions, bytes or words: other whole numbers count to 255."""
+    if values.dtype.str[1:] in ("u1", "u2"):
+        return values
+    whole = values.dtype.kind in "ui" or ((values > 1).any() and (values == np.rint(values)).all())
+    return np.clip(values, 0, 255).astype(np.uint8) if whole else values
 
 
 def joined_layer(

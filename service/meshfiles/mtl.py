@@ -57,7 +57,7 @@ def named_files(data: bytes, siblings: SiblingFiles) -> list[str]:
     """Return the libraries that an OBJ names, and the images that these name."""
     opened, names = Opened(siblings), list[str]()
     for found in _LIBRARY.findall(plain_text(data)) if b"mtllib" in data else ():
-        for file in library_files(name_of(found.strip()), opened):
+        for file in library_files(name_of(found), opened):
             names.append(file.name)
             for _, properties in _definitions(bytes(file.content)):
                 maps = (_image(properties.get(keyword)) for keyword in _MAPS)
@@ -67,7 +67,7 @@ def named_files(data: bytes, siblings: SiblingFiles) -> list[str]:
 
 def library_files(library: str, opened: Opened) -> list[File]:
     """Open what a `mtllib` statement names: one file whose name may have blanks, or several."""
-    whole = opened.open(library)
+    whole = opened.open(library) or opened.open(library.strip('"'))
     found = [whole] if whole is not None else [opened.open(name) for name in library.split()]
     return [file for file in found if file is not None]
 
@@ -80,7 +80,7 @@ def _definitions(data: bytes) -> Iterator[tuple[str, dict[bytes, bytes]]]:
         if keyword.lower() == b"newmtl":
             if name is not None:
                 yield name, properties
-            name, properties = name_of(rest.strip()), {}
+            name, properties = name_of(rest), {}
         elif keyword:
             properties[keyword.lower()] = rest.strip()
     if name is not None:
@@ -135,4 +135,4 @@ def _image(text: bytes | None) -> str | None:
         for _ in range(_OPTIONS[option]):
             if words and (option not in _NUMBERS or is_number(words[0])):
                 words.pop(0)
-    return name_of(b" ".join(words)).replace("\\", "/") or None
+    return name_of(b" ".join(words)).strip('"').replace("\\", "/") or None

@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int
 
-from ..errors import UnreadableError
 from .mesh_file import (
     COLOUR,
     GROUP,
@@ -28,6 +27,7 @@ from .mesh_file import (
     Layer,
     MeshFile,
     as_fractions,
+    colours_of,
     dropped,
     offsets_of,
 )
@@ -43,17 +43,20 @@ _DROPPED = {
     b"curv2": "free-form curves",
     b"surf": "free-form surfaces",
 }
-_SLASH, _ZERO = b"/0"
+(_SLASH,) = b"/"
+# Colours as ZBrush writes them.
+_PAINT = re.compile(rb"(?m)^#MRGB[ \t]+([0-9A-Fa-f]+)")
 _REFERENCES = re.compile(rb"[+-]?\d+(?:/(?:[+-]?\d+)?){0,2}")
 
 
 def read_obj(data: bytes) -> MeshFile:
-    """Read an OBJ; indices below 0 count back from their own line.
+    """Read an OBJ; indices below 0 count back from their own line, # may be part of a name.
 
     Raises:
         UnreadableError: a position or a face cannot be read, or names a vertex that there is not.
     """
-    text = cut_text(plain_text(data), "OBJ", continued=True)
+    data = plain_text(data)
+    text = cut_text(data, "OBJ", continued=True)
     is_v, is_vt, is_vn = (text.keyword(word) for word in (b"v", b"vt", b"vn"))
     is_face = text.keyword(b"f") | text.keyword(b"fo")
     vertices, colours = _positions(text, is_v)
@@ -71,9 +74,15 @@ def read_obj(data: bytes) -> MeshFile:
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
     layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
+    painted = b"".join(_PAINT.findall(data)) if b"#MRGB" in data else b""
+    if len(painted) == 8 * len(vertices):
+        # Of each vertex a mask, and three bytes of its colour.
+        colours = np.frombuffer(bytes.fromhex(painted.decode()), np.uint8).reshape(-1, 4)[:, 1:]
+    elif painted:
+        lost["colours that not all vertices have"] += 1
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)
-    labels, libraries = _statements(text, ~(is_v | is_vt | is_vn | is_face), line, lost)
+    labels, libraries = _statements(text, data, ~(is_v | is_vt | is_vn | is_face), line, lost)
     return MeshFile(
         vertices,
         offsets_of(sizes),
@@ -99,10 +108,14 @@ def _positions(
     coloured = counts >= 6
     alike = bool((counts == counts[0]).all())
     rows = values.reshape(len(counts), -1) if alike else _rows(values, counts, 6)
-    colours = rows[:, 3:7] if coloured.any() else None
-    if colours is not None:
-        colours[~coloured] = 1.0
-    return np.ascontiguousarray(rows[:, :3]), colours
+    points = np.ascontiguousarray(rows[:, :3])
+    if not coloured.any():
+        return points, None
+    given = colours_of(rows[coloured, 3:7])
+    white = 255 if given.dtype == np.uint8 else 1
+    colours = np.full((len(points), given.shape[1]), white, given.dtype)
+    colours[coloured] = given
+    return points, colours
 
 
 def _references(
@@ -115,34 +128,22 @@ def _references(
         references = np.zeros((len(words), 3), dtype=np.int64)
         references[:, 0] = text.numbers(words, np.int64)
         return references, sizes
-    values = parsed(_three_numbers(letters).tobytes(), np.int64)
-    if len(values) != 3 * len(words):
-        bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
-        what = name_of(text.word(bad)[:40])
-        raise UnreadableError(
-            f"line {text.line_of(bad)} of the OBJ file: {what!r} is no corner of a face"
-        )
-    return values.reshape(-1, 3), sizes
-
-
-def _three_numbers(letters: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
-    """Write corners of one to three numbers as three each, 0 where none stands."""
-    slash = letters == _SLASH
     blank = letters <= ord(" ")
-    follows = np.append(slash[1:] | blank[1:], True)
-    left_out = np.flatnonzero(slash & follows) + 1
-    ends = np.flatnonzero(blank & np.append(False, ~blank[:-1]))
-    slashes = np.diff(np.searchsorted(np.flatnonzero(slash), ends), prepend=0)
-    letters = np.where(slash, np.uint8(ord(" ")), letters)
-    short = [np.repeat(ends[slashes < 2], 2), np.repeat(ends[slashes < 1], 2)]
-    places = np.concatenate([left_out, *short])
-    fill = np.concatenate(
-        [
-            np.full(len(left_out), _ZERO),
-            np.tile(np.frombuffer(b" 0", np.uint8), (len(short[0]) + len(short[1])) // 2),
-        ]
+    slashes = np.searchsorted(
+        np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
     )
-    return np.insert(letters, places, fill)
+    counts = 1 + np.diff(slashes, prepend=0)
+    corners = np.where(blank, np.uint8(ord(" ")), letters).tobytes()
+    # What is left out is 0.
+    corners = corners.replace(b"//", b"/0/").replace(b"/ ", b"/0 ").replace(b"/", b" ")
+    values = parsed(corners, np.int64)
+    if counts.max() > 3 or len(values) != counts.sum():
+        bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
+        raise text.word_fault(bad, "no corner of a face")
+    places = np.arange(len(values)) - np.repeat(np.cumsum(counts) - counts, counts)
+    references = np.zeros((len(words), 3), dtype=np.int64)
+    references[np.repeat(np.arange(len(words)), counts), places] = values
+    return references, sizes
 
 
 def _absolute(
@@ -168,9 +169,10 @@ def _layers(
     }
     for name, (lines, rows, width, least, shown) in kinds.items():
         count = int(lines.sum())
+        named = (rows >= 0) & (rows < count)
+        lost[f"references to missing {shown}"] += int((~named & (rows != NONE)).sum())
         if not count:
             continue
-        named = (rows >= 0) & (rows < count)
         values = _values(text, lines, width, least) if named.any() else None
         if values is None:
             why = " that cannot be read" if named.any() else " that no face names"
@@ -205,13 +207,14 @@ def _rows(
 
 def _statements(
     text: Text,
+    data: bytes,
     others: Bool[np.ndarray, " L"],
     face_lines: Int[np.ndarray, " F"],
     lost: Counter[str],
 ) -> tuple[dict[str, Labels], tuple[str, ...]]:
     """Return the names that statements give to the faces below them, and the libraries.
 
-    Other statements are counted as lost.
+    `data` has the comments that are blank in the text. Other statements are counted as lost.
     """
     known = {word: kind for kind, word in STATEMENTS.items()}
     given: dict[str, list[tuple[int, str]]] = {kind: [] for kind in known.values()}
@@ -220,9 +223,8 @@ def _statements(
         first = text.first[line]
         word = text.word(first).lower()
         if word in known or word == _LIBRARY:
-            begin = text.ends[first]
-            rest = text.letters[begin : text.ends[first + text.counts[line] - 1]].tobytes()
-            name = name_of(rest.strip())
+            end = text.starts[line + 1] if line + 1 < len(text.starts) else len(data)
+            name = name_of(data[text.ends[first] : end].replace(b"\\\n", b" "))
             if word == _LIBRARY:
                 libraries.append(name)
             else:

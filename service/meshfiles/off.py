@@ -11,13 +11,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..errors import UnreadableError
-from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
+from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, colours_of, dropped, offsets_of
 from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
 # The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0". Or they
-# stand alone: Geomview asks for no header.
-_HEADER = re.compile(
-    rb"\s*(?:#[^\n]*\n\s*)*(?:(ST)?(C)?(N)?(4)?OFF(?:[ \t]+(BINARY))?|(?=\d+[ \t]+\d+\s))"
+# stand alone: Geomview asks for no header. Open3D writes NCOFF where Geomview has CNOFF.
+HEADER = re.compile(
+    rb"\s*(?:#[^\n]*\n\s*)*(?:((?:ST|[CN4])*)(?i:OFF)(?:[ \t]+(BINARY))?|(?=\d+[ \t]+\d+\s))"
 )
 _CUT_OFF = "the OFF file ends before its last face, or has none"
 
@@ -29,11 +29,12 @@ def read_off(data: bytes) -> MeshFile:
         UnreadableError: not a text OFF file, or one without all of its faces.
     """
     data = plain_text(data)
-    header = _HEADER.match(data)
+    header = HEADER.match(data)
     if header is None:
         raise UnreadableError("this is not an OFF file: it begins neither with OFF nor with counts")
-    uv, colour, normal, w, binary = (group is not None for group in header.groups())
-    if binary:
+    prefix = header[1] or b""
+    uv, colour, normal, w = (kind in prefix for kind in (b"ST", b"C", b"N", b"4"))
+    if header[2]:
         raise UnreadableError("the OFF file is binary: only text is read")
     text = cut_text(data[header.end() :], "OFF", data.count(b"\n", 0, header.end()))
     # Vertices, faces, edges: the last is of no use, and some programs leave it out.
@@ -51,8 +52,9 @@ def read_off(data: bytes) -> MeshFile:
     widths[COLOUR] = table.shape[1] - sum(widths.values())
     columns = np.split(table, np.cumsum([*widths.values()])[:-1], axis=1)
     parts = dict(zip(widths, columns, strict=True))
-    sizes, corners, of_faces = _faces(text, at, face_count)
-    lost = {"fourth coordinates": int((parts["w"] != 1).sum())}
+    sizes, corners, of_faces, end = _faces(text, at, face_count)
+    behind = "words behind the last face"
+    lost = {"fourth coordinates": int((parts["w"] != 1).sum()), behind: len(text.begins) - end}
     if widths[COLOUR] not in (0, 3, 4):
         lost["values of vertices"] = vertex_count
         del parts[COLOUR]
@@ -60,14 +62,14 @@ def read_off(data: bytes) -> MeshFile:
     if of_faces is None:
         lost["colours of faces"] = face_count
     elif of_faces.shape[1] > 0:
-        face_values[COLOUR] = _colours(of_faces)
+        face_values[COLOUR] = colours_of(of_faces)
     layers = {
         name: Layer(parts[name], corners)
         for name in (NORMAL, COLOUR, UV)
         if name in parts and widths[name]
     }
     if COLOUR in layers:
-        layers[COLOUR] = Layer(_colours(layers[COLOUR].values), layers[COLOUR].rows)
+        layers[COLOUR] = Layer(colours_of(layers[COLOUR].values), layers[COLOUR].rows)
     return MeshFile(
         parts[""],
         offsets_of(sizes),
@@ -118,20 +120,25 @@ def _vertices(
 
 def _faces(
     text: Text, begin: int, count: int
-) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " C"], Float[np.ndarray, "F K"] | None]:
-    """Read sizes, corners, and colours; None where only some faces have one."""
-    numbers = text.numbers(np.arange(begin, len(text.begins)))
+) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " C"], Float[np.ndarray, "F K"] | None, int]:
+    """Read sizes, corners, and colours; None where only some faces have one.
+
+    Return also where the last face ends.
+    """
     lines = _rows_of(text, begin, count)
     if lines is not None:
+        end = int(text.first[lines[-1]] + text.counts[lines[-1]])
+        numbers = text.numbers(np.arange(begin, end))
         places = text.first[lines] - begin
-        sizes = _whole(numbers[places])
+        sizes = _whole(text, numbers, places, begin)
         left = text.counts[lines] - 1 - sizes
         if (sizes >= 0).all() and (left >= 0).all():
-            corners = numbers[_behind(places, sizes)]
+            corners = _whole(text, numbers, _behind(places, sizes), begin)
             colours = None
             if (left == left[0]).all() and left[0] in (0, 3, 4):
                 colours = numbers[(places + 1 + sizes)[:, None] + np.arange(left[0])]
-            return sizes, _whole(corners), colours
+            return sizes, corners, colours, end
+    numbers = text.numbers(np.arange(begin, len(text.begins)))
     begins: list[int] = []
     at = 0
     # One by one: where a face begins depends on the sizes of those before it.
@@ -141,8 +148,9 @@ def _faces(
         begins.append(at)
         at += 1 + int(numbers[at])
     places = np.array(begins)
-    sizes = _whole(numbers[places])
-    return sizes, _whole(numbers[_behind(places, sizes)]), np.zeros((count, 0))
+    sizes = _whole(text, numbers, places, begin)
+    corners = _whole(text, numbers, _behind(places, sizes), begin)
+    return sizes, corners, np.zeros((count, 0)), begin + at
 
 
 def _behind(places: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " C"]:
@@ -151,19 +159,14 @@ def _behind(places: Int[np.ndarray, " F"], sizes: Int[np.ndarray, " F"]) -> Int[
     return firsts + np.arange(len(firsts))
 
 
-def _whole(numbers: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    fits = (np.abs(numbers) < 2**53) & (numbers == np.floor(numbers))
+def _whole(
+    text: Text, numbers: Float[np.ndarray, " N"], places: Int[np.ndarray, " K"], begin: int
+) -> Int[np.ndarray, " K"]:
+    values = numbers[places]
+    fits = (np.abs(values) < 2**53) & (values == np.floor(values))
     if not fits.all():
-        wrong = float(numbers[np.argmin(fits)])
-        raise UnreadableError(f"the OFF file has a face of which {wrong:g} is no count or vertex")
-    return numbers.astype(np.int64)
-
-
-def _colours(values: Float[np.ndarray, "N K"]) -> np.ndarray:
-    """Return colours as bytes where they are whole numbers of 0 to 255, else as fractions."""
-    if len(values) and values.max() > 1:
-        return np.clip(np.rint(values), 0, 255).astype(np.uint8)
-    return values
+        raise text.word_fault(begin + int(places[np.argmin(fits)]), "no count or vertex")
+    return values.astype(np.int64)
 
 
 def write_off(mesh: MeshFile) -> bytes:

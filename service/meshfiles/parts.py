@@ -69,7 +69,8 @@ def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None
         labels = [mesh.labels[kind] for kind in kinds if kind in mesh.labels]
         names.append({each for label in labels for each in label.names})
         if name is not None:
-            own = [label.named(name) for label in labels] or [np.zeros_like(chosen)]
+            own = [np.zeros_like(chosen)]
+            own += [label.named(name, words=GROUP in kinds) for label in labels]
             chosen &= np.any(own, axis=0)
     check_chosen(options, bool(chosen.any()), [*names[0]], names[1])
     return chosen

@@ -16,7 +16,17 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from ..errors import UnreadableError
-from .mesh_file import COLOUR, NONE, NORMAL, UV, Layer, MeshFile, dropped, offsets_of
+from .mesh_file import (
+    COLOUR,
+    NONE,
+    NORMAL,
+    UV,
+    Layer,
+    MeshFile,
+    colours_of,
+    dropped,
+    offsets_of,
+)
 from .text import count_words, cut_text, parsed, plain_text
 
 # It is text, and a file may be one long comment.
@@ -199,19 +209,14 @@ def _layers(vertex: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     left = {name: column for name, column in vertex.items() if name not in ("x", "y", "z")}
     layers: dict[str, np.ndarray] = {}
     for layer, choices in _LAYERS.items():
-        chosen = next((names for names in choices if set(names) <= left.keys()), ())
-        if not chosen or (layer == COLOUR and len({left[name].dtype for name in chosen}) > 1):
+        known = (names for names in choices if set(names) <= left.keys())
+        alike = layer != COLOUR
+        chosen = next((n for n in known if alike or len({left[name].dtype for name in n}) == 1), ())
+        if not chosen:
             continue
         values = np.stack([left.pop(name) for name in chosen], axis=1)
-        layers[layer] = _colours(values) if layer == COLOUR else values.astype(np.float64)
+        layers[layer] = colours_of(values) if layer == COLOUR else values.astype(np.float64)
     return layers | {f"_{name}": column[:, None] for name, column in left.items()}
-
-
-def _colours(values: np.ndarray) -> np.ndarray:
-    """Return colours as fractions, bytes or words: those of other integers are of 0 to 255."""
-    if values.dtype.kind == "f" or values.dtype.str[1:] in ("u1", "u2"):
-        return values
-    return np.clip(values, 0, 255).astype(np.uint8)
 
 
 def _face_values(face: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -219,7 +224,7 @@ def _face_values(face: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     values = {name: column[:, None] for name, column in face.items()}
     names = [name for name in ("red", "green", "blue", "alpha") if name in values]
     if len(names) >= 3 and len({values[name].dtype for name in names}) == 1:
-        values[COLOUR] = _colours(np.hstack([values.pop(name) for name in names]))
+        values[COLOUR] = colours_of(np.hstack([values.pop(name) for name in names]))
     return values
 
 
@@ -245,7 +250,8 @@ def _numbers(data: bytes, header: PlyHeader) -> Float[np.ndarray, " N"]:
         body = _REMARK.sub(b"", body)
     numbers = parsed(body)
     if len(numbers) != count_words(body):
-        text = cut_text(body, "PLY", plain_text(data[: header.end]).count(b"\n"))
+        before = plain_text(data[: header.end]).count(b"\n")
+        text = cut_text(body, "PLY", before, comments=False)
         numbers = text.numbers(np.arange(len(text.begins)))
     return numbers
 
@@ -259,7 +265,6 @@ def _tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
     def dtype_of(kind: str) -> np.dtype:
         return np.dtype("f8" if text else f"{header.order}{kind}")
 
-    typed = _typed if text else np.ndarray.astype
     tables: dict[str, _Columns] = {}
     for element in header.elements:
         stored = [
@@ -267,12 +272,10 @@ def _tables(data: bytes, header: PlyHeader) -> dict[str, _Columns]:
             for own in element.properties
         ]
         columns, at = _columns(element, stored, data, at)
-        tables[element.name] = {
-            own.name: _List(values.sizes, typed(values.values, own.kind))
-            if own.count_kind
-            else typed(values.values, own.kind)
-            for own, values in zip(element.properties, columns, strict=True)
-        }
+        table = tables[element.name] = _Columns()
+        for own, column in zip(element.properties, columns, strict=True):
+            values = _typed(column.values, own) if text else column.values.astype(own.kind)
+            table[own.name] = values if own.count_kind is None else _List(column.sizes, values)
     return tables
 
 
@@ -327,7 +330,7 @@ def _row(stored: _Stored, data: bytes, at: int) -> list[tuple[int, int]] | None:
             if at + count.itemsize > len(data):
                 return None
             (size,) = unpack_from(f"{count.str[0]}{count.char}".replace("|", "="), data, at)
-            if not 0 <= size <= len(data):
+            if not 0 <= size <= len(data) or size % 1:
                 return None
             at += count.itemsize
         found.append((at, int(size)))
@@ -344,15 +347,15 @@ def _gathered(
     return _List(sizes, letters[places[:, None] + np.arange(kind.itemsize)].reshape(-1).view(kind))
 
 
-def _typed(values: Shaped[np.ndarray, " N"], kind: str) -> Shaped[np.ndarray, " N"]:
+def _typed(values: Shaped[np.ndarray, " N"], own: Property) -> Shaped[np.ndarray, " N"]:
     """Return numbers in the type that the header gives; floats of text stay as they are read."""
-    if kind[0] == "f":
+    if own.kind[0] == "f":
         return values.astype(np.float64)
-    if (values != np.floor(values)).any():
-        wrong = float(values[np.argmax(values != np.floor(values))])
-        raise UnreadableError(f"the PLY file has {wrong:g} where its header says a whole number")
-    bounds = np.iinfo(kind)
-    return np.clip(values, bounds.min, bounds.max).astype(kind)
+    wrong = values[values != np.floor(values)]
+    if len(wrong):
+        raise UnreadableError(f"{own.name} of the PLY file is {wrong[0]:g}, no whole number")
+    bounds = np.iinfo(own.kind)
+    return np.clip(values, bounds.min, bounds.max).astype(own.kind)
 
 
 def _too_short(element: Element, rows: int) -> UnreadableError:
@@ -383,9 +386,10 @@ def write_ply(mesh: MeshFile) -> bytes:
     fields, columns = [], []
     for name, values in mesh.face_values.items():
         add(_names_of(name, values.shape[1]), values, values.dtype.str[1:])
-    head += [f"element face {len(mesh.sizes)}", "property list uchar int vertex_indices"]
+    count = "u1" if mesh.sizes.max(initial=0) < 256 else "i4"
+    head += [f"element face {len(mesh.sizes)}", f"property list {_NAMES[count]} int vertex_indices"]
     head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
-    faces = _face_bytes(mesh, fields, columns)
+    faces = _face_bytes(mesh, count, fields, columns)
     return b"".join(["\n".join([*head, "end_header\n"]).encode("latin-1"), vertex.tobytes(), faces])
 
 
@@ -412,23 +416,19 @@ def _records(
     return table
 
 
-def _face_bytes(mesh: MeshFile, fields: list[tuple[str, str]], columns: list[np.ndarray]) -> bytes:
-    """Write polygons: a byte for the count, the corners, and what faces have beside them."""
+def _face_bytes(
+    mesh: MeshFile, count: str, fields: list[tuple[str, str]], columns: list[np.ndarray]
+) -> bytes:
+    """Write polygons: how many corners, the corners, and what faces have beside them."""
     sizes = mesh.sizes
-    kinds = [(f"c{place}", f"<{kind}") for place, (_, kind) in enumerate(fields)]
-    if len(sizes) and (sizes == sizes[0]).all():
-        size = int(sizes[0])
-        table = np.zeros(len(sizes), [("n", "u1"), ("corners", "<i4", (size,)), *kinds])
-        table["n"], table["corners"] = size, mesh.corners.reshape(-1, size)
-        for (name, _), column in zip(kinds, columns, strict=True):
-            table[name] = column
-        return table.tobytes()
-    corners = mesh.corners.astype("<i4").tobytes()
-    behind = _records(fields, columns, len(sizes))
-    offsets = (4 * mesh.offsets).tolist()
-    return b"".join(
-        bytes([size]) + corners[begin:end] + behind[face].tobytes()
-        for face, (size, begin, end) in enumerate(
-            zip(sizes.tolist(), offsets[:-1], offsets[1:], strict=True)
-        )
-    )
+    beside = np.dtype(count).itemsize + sum(np.dtype(kind).itemsize for _, kind in fields)
+    starts = offsets_of(beside + 4 * sizes)
+    content = np.empty(starts[-1], dtype=np.uint8)
+    for size in np.unique(sizes).tolist():
+        chosen = np.flatnonzero(sizes == size)
+        corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
+        rows = [np.full(len(chosen), size), *corners.T, *(column[chosen] for column in columns)]
+        kinds = [("", count), *[("", "i4")] * size, *fields]
+        table = _records(kinds, rows, len(chosen)).view(np.uint8).reshape(len(chosen), -1)
+        content[starts[chosen, None] + np.arange(table.shape[1])] = table
+    return content.tobytes()

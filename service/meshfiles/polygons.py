@@ -27,14 +27,12 @@ from ..advice import Bends, count_bends
 from ..course import Course
 from ..errors import UnrefinableError
 from ..gltf.refine.attributes import in_type_of
-from ..gltf.refine.mesh_refine import GATE, RATIO
-from ..gltf.refine.near_misses import near_miss_changes, near_misses
+from ..gltf.refine.changes import near_miss_changes, near_misses
+from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
 from ..gltf.refine.normals import safe_unit
 from ..gltf.refine.polygons import PolygonSplit
-from ..meshes.shape_creases import creases_by_shape
 from ..meshes.uv_charts import refined_charts
-from ..meshes.weld import Weld, weld, weld_by_label
-from ..meshes.weld_tolerance import weld_within
+from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Options
 from ..report import Change
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of

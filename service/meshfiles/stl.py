@@ -13,6 +13,8 @@ from .mesh_file import MeshFile, offsets_of
 from .text import cut_text, plain_text
 
 HEADER = 84
+# A facet as text: a normal, three vertices, and the words that name and enclose them.
+WORDS_PER_FACET = 21
 # The two bytes behind the numbers of each facet are by no standard its colour.
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 # How far text is told from a binary file whose header begins as a text does.
@@ -25,9 +27,8 @@ def read_stl(data: bytes) -> MeshFile:
     Raises:
         UnreadableError: a file that ends within a facet.
     """
-    changes: tuple[Change, ...] = ()
     if is_text(data):
-        points, sizes = _of_text(plain_text(data))
+        points, sizes, changes = _of_text(plain_text(data))
     else:
         points, changes = _of_binary(data)
         sizes = np.full(len(points) // 3, 3)
@@ -64,7 +65,10 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
             f"the STL file is no text, and no whole binary STL: it says {said} facets and has "
             f"{count} and {left} bytes"
         )
-    facets = np.frombuffer(data, FACET, count, HEADER)
+    facet = FACET
+    if said != count == int.from_bytes(data[HEADER - 4 : HEADER], "big"):
+        said, facet = count, FACET.newbyteorder(">")
+    facets = np.frombuffer(data, facet, count, HEADER)
     told = {
         "bytes behind the last facet left out": left,
         "colours of faces dropped": int(np.count_nonzero(facets["attribute"])),
@@ -74,7 +78,9 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
     return facets["corners"].reshape(-1, 3).astype(np.float64), changes
 
 
-def _of_text(data: bytes) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F"]]:
+def _of_text(
+    data: bytes,
+) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F"], tuple[Change, ...]]:
     """Read the vertices of each loop, on whatever lines they stand; all else is passed over."""
     text = cut_text(data, "STL")
     lengths = text.ends - text.begins
@@ -82,14 +88,23 @@ def _of_text(data: bytes) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " F
     vertex = places[text.is_word(b"vertex", places)]
     places = np.flatnonzero(lengths == len("endloop"))
     ends = places[text.is_word(b"endloop", places)]
+    names = (text.keyword(b"solid") | text.keyword(b"endsolid")) & (text.counts < WORDS_PER_FACET)
+    if names.any():
+        # A name may have any words.
+        begin, behind = text.first[names], text.first[names] + text.counts[names]
+        line = np.searchsorted(begin, vertex, "right") - 1
+        vertex = vertex[(line < 0) | (vertex >= behind[line])]
     words = vertex[:, None] + np.arange(1, 4)
     if len(vertex) and words[-1, -1] >= len(text.begins):
         raise UnreadableError("the STL file ends within a facet")
     points = text.numbers(words.reshape(-1)).reshape(-1, 3)
     sizes = np.diff(np.searchsorted(vertex, ends), prepend=0)
-    if sizes.sum() < len(vertex):
+    rest = data[text.ends[ends[-1]] if len(ends) else 0 :].lower()
+    whole = b"solid" in rest
+    if sizes.sum() < len(vertex) or (not whole and b"facet" in rest.replace(b"endfacet", b"")):
         raise UnreadableError("the STL file ends within a facet")
-    return points, sizes
+    told = "end of the last solid missing: the file may be cut off"
+    return points, sizes, () if whole else (Change("", told, 1),)
 
 
 def write_stl(mesh: MeshFile) -> bytes:

@@ -17,9 +17,14 @@ NUMBER = "%.12g"
 # Rows of text that are made at a time.
 BLOCK = 2**14
 _BLANK, _LINE_END, _COMMENT, _BACKSLASH = b" \n#\\"
+_BEHIND_NAME = re.compile(rb"\s#(?:\s.*)?$", re.DOTALL)
+# How Microsoft's old libraries write infinity and NaN.
+_NO_NUMBER = re.compile(rb"\d\.#(?:(INF)|IND|[QS]NAN)\w*")
 # What a joined line has in place of its end, which still counts as one.
 _JOINED = b" \x0b"
-_NUMBER = re.compile(rb"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)", re.I)
+_NUMBER = re.compile(
+    rb"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan(?:\(\w*\))?|inf(?:inity)?)", re.I
+)
 _WIDE = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF16_LE, "utf-16"),
@@ -38,11 +43,17 @@ def plain_text(data: bytes) -> bytes:
         data = data.decode(encoding, errors="replace").encode()
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b".#" in data:
+        data = _NO_NUMBER.sub(lambda found: b"inf" if found[1] else b"nan", data)
     return data
 
 
 def name_of(text: bytes) -> str:
-    """Return a name; those of old files are Latin-1."""
+    """Return a name without the comment behind it; those of old files are Latin-1.
+
+    A # within a word, or before one as in `Material #2`, begins no comment.
+    """
+    text = _BEHIND_NAME.sub(b"", text).strip()
     try:
         return text.decode()
     except UnicodeDecodeError:
@@ -72,18 +83,17 @@ class Text:
     counts: Int[np.ndarray, " L"]
     before: int = 0
 
-    def line_of(self, word: int) -> int:
-        """Return the number of the line that a word stands on, as editors count them."""
-        return self.number(int(np.searchsorted(self.starts, self.begins[word], "right")) - 1)
-
-    def number(self, line: int) -> int:
-        """Return the number of a line in the file, where continued lines are several."""
-        above = self.letters[: self.starts[line]]
-        return self.before + line + 1 + int(np.count_nonzero(above == _JOINED[1]))
+    def word_fault(self, word: int, problem: str) -> UnreadableError:
+        """Return the error of a word that cannot be read."""
+        line = int(np.searchsorted(self.starts, self.begins[word], "right")) - 1
+        return self.fault(line, f"{name_of(self.word(word)[:40])!r} is {problem}")
 
     def fault(self, line: int, problem: str) -> UnreadableError:
         """Return the error of a line that cannot be read."""
-        return UnreadableError(f"line {self.number(line)} of the {self.what} file: {problem}")
+        above = self.letters[: self.starts[line]]
+        # As editors count: continued lines are several.
+        number = self.before + line + 1 + int(np.count_nonzero(above == _JOINED[1]))
+        return UnreadableError(f"line {number} of the {self.what} file: {problem}")
 
     def keyword(self, word: bytes) -> Bool[np.ndarray, " L"]:
         """Return which lines begin with a word."""
@@ -126,10 +136,7 @@ class Text:
         values = parsed(self.cut(words).tobytes(), dtype)
         if len(values) != len(words):
             bad = next((w for w in words.tolist() if not is_number(self.word(w), dtype)), 0)
-            shown = name_of(self.word(bad)[:40])
-            raise UnreadableError(
-                f"line {self.line_of(bad)} of the {self.what} file: {shown!r} is no number"
-            )
+            raise self.word_fault(bad, "no number")
         return values
 
     def word(self, number: int) -> bytes:
@@ -161,9 +168,11 @@ def count_words(text: bytes) -> int:
     return int(np.count_nonzero(filled[1:] > filled[:-1])) + bool(filled[:1].any())
 
 
-def cut_text(text: bytes, what: str, before: int = 0, *, continued: bool = False) -> Text:
-    """Cut a plain text into lines and words; `continued` joins lines that end with a backslash."""
-    letters, ends = plain_letters(text, continued=continued)
+def cut_text(
+    text: bytes, what: str, before: int = 0, *, continued: bool = False, comments: bool = True
+) -> Text:
+    """Cut a plain text into lines and words, as `plain_letters` makes them."""
+    letters, ends = plain_letters(text, continued=continued, comments=comments)
     starts = np.append(0, ends + 1)
     # With a blank before the first letter and one behind the last.
     filled = np.zeros(len(letters) + 2, dtype=bool)
@@ -176,15 +185,15 @@ def cut_text(text: bytes, what: str, before: int = 0, *, continued: bool = False
 
 
 def plain_letters(
-    text: bytes, *, continued: bool
+    text: bytes, *, continued: bool, comments: bool = True
 ) -> tuple[UInt8[np.ndarray, " N"], Int[np.ndarray, " E"]]:
-    """Return a text with blank comments, and where its lines end.
+    """Return a text, and where its lines end; comments are blank, if # begins one.
 
     `continued` joins a line that ends with a backslash, outside of a comment, with the next.
     """
     letters = np.frombuffer(text, dtype=np.uint8)
     ends = np.flatnonzero(letters == _LINE_END)
-    if _COMMENT in text:
+    if comments and _COMMENT in text:
         letters = _without_comments(letters, ends)
     if continued and _BACKSLASH in text:
         letters = np.append(letters, np.uint8(_LINE_END))

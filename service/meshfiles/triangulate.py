@@ -41,7 +41,7 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     crossed = sum(cut.crossed for cut in cuts)
     told = {
         "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
-        "polygons without an area or that cross themselves cut around one corner": crossed,
+        "polygons without an area or that cross themselves: their triangles may overlap": crossed,
     }
     changes = [Change("", what, count) for what, count in told.items() if count]
     return mesh.cut(places, polygon).with_changes(changes)
@@ -71,7 +71,7 @@ class Cut:
     Attributes:
         places: the places of each triangle's corners among those of the polygons.
         polygon: the polygon that each triangle is of.
-        crossed: polygons that cross themselves or have no area, cut around their first corner.
+        crossed: polygons that cross themselves or have no area.
     """
 
     places: Int[np.ndarray, "T 3"]
@@ -110,10 +110,11 @@ def cut_polygons(
     # One by one: such polygons are few, and each is cut on its own.
     for face in np.flatnonzero(wrong).tolist():
         share = slice(offsets[face], offsets[face + 1])
-        ears = _by_ears(_in_plane(local[share], normals[face]), corners[share])
-        if ears is None:
-            crossed += 1
-        else:
+        flat = _in_plane(local[share], normals[face])
+        ears = _by_ears(flat, corners[share])
+        area = np.linalg.norm(normals[face]) * (1 + EXACT)
+        crossed += int(ears is None or _areas(flat, ears).sum() > area)
+        if ears is not None:
             keep[starts[face] : starts[face] + pieces[face]] = False
             made.append((face, ears + offsets[face]))
     if made:
@@ -171,8 +172,7 @@ def _by_ears(
     if area == 0:
         return None
     tolerance = EXACT * abs(area)
-    # A corner that repeats its neighbour makes no side.
-    own = np.flatnonzero(corners != np.roll(corners, 1))
+    own = _without_spikes(points, np.flatnonzero(corners != np.roll(corners, 1)))
     for shift in range(ATTEMPTS if len(own) <= MANY else 1):
         order = np.roll(own, -shift)
         ears = _earcut(points[order])
@@ -182,6 +182,24 @@ def _by_ears(
             areas = _areas(points, triangles)
             return np.where((areas < 0)[:, None], triangles[:, ::-1], triangles)
     return None
+
+
+def _without_spikes(
+    points: Float[np.ndarray, "n 2"], own: Int[np.ndarray, " m"]
+) -> Int[np.ndarray, " k"]:
+    """Return corners of a polygon but those where it turns back to the corner before."""
+    places, ring = points.tolist(), list[int]()
+    for corner in own.tolist():
+        ring.append(corner)
+        while len(ring) > 2 and places[ring[-1]] == places[ring[-3]]:
+            del ring[-2:]
+    # Where the outline begins the last corner, or the first, may be one.
+    begin, end = 0, len(ring)
+    while end - begin > 2 and places[ring[end - 2]] == places[ring[begin]]:
+        end -= 2
+    while end - begin > 2 and places[ring[end - 1]] == places[ring[begin + 1]]:
+        begin, end = begin + 1, end - 1
+    return np.array(ring[begin:end], dtype=np.int64)
 
 
 def _earcut(points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "t 3"] | None:

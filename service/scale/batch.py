@@ -45,8 +45,6 @@ class Batch:
     dry: bool = False
 
 
-# A file that its worker does not survive twice is taken to be the cause.
-MOST_ATTEMPTS = 2
 # Files that are looked up in the journal together.
 LOOK_UP = 64
 
@@ -57,7 +55,7 @@ def batch_work(seconds: float, job: Callable[[Task], Row] = run) -> Work[Task, R
     def lost(task: Task, error: ServiceError) -> Row:
         return replace(failed(task.url, task.output, error), attempts=task.attempt)
 
-    return Work(job, lost, MOST_ATTEMPTS, seconds, read_libraries)
+    return Work(job, lost, seconds, read_libraries)
 
 
 def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summary:

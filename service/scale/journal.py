@@ -21,7 +21,6 @@ from pns_common.files import replacing
 from ..errors import InvalidParameter
 from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Known, Row
 from .places import THIS_MACHINE, Place, place_of
-from .report_file import check_report_file
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows (
@@ -179,7 +178,10 @@ def check_report(report: Path, source: str) -> None:
     """Raise InvalidParameter where a report of a source cannot be written under this name."""
     if report.suffix not in REPORTS:
         raise InvalidParameter("report", f"{report}: it must end in {' or '.join(REPORTS)}")
-    check_report_file(report)
+    if not report.parent.is_dir():
+        raise InvalidParameter("report", f"{report.parent}: there is no such folder")
+    if report.is_dir():
+        raise InvalidParameter("report", f"{report}: it is a folder")
     if Place(THIS_MACHINE, str(report.absolute())).path_to(place_of(source)) == ".":
         raise InvalidParameter("report", f"{report}: the report would replace SOURCE")
     # Looked for, not loaded: that takes as long as a worker's start, and would go before it.

@@ -21,7 +21,7 @@ from rich.progress import Task as RichTask
 from rich.table import Table
 from rich.text import Text
 
-from ..printable import printable
+from ..errors import printable
 from .job import DONE, FAILED, PLANNED, SKIPPED, Row
 from .sources import Item
 

@@ -15,6 +15,14 @@ SECONDS_PER_PRIMITIVE = 5e-4
 SECONDS_PER_FACE = 1.2e-6
 SECONDS_PER_LEARNED_FACE = 2e-6
 SECONDS_PER_VALUE = 1.4e-7
+# How much one job's time tells.
+LEARNING = 0.2
+# Below, a job's time is mostly what goes on around it.
+TELLING_SECONDS = 0.05
+# Beyond these times what was expected a job tells of its file, not of the machine.
+SURPRISE = 2.0
+# No machine that serves is so much slower, or faster, than the one that was measured.
+MOST = 16.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,3 +51,22 @@ def cost_of(
     seconds += SECONDS_PER_FACE * faces + SECONDS_PER_LEARNED_FACE * learned
     seconds += SECONDS_PER_VALUE * values + SECONDS_PER_ITEM * items
     return Cost(faces, primitives, seconds)
+
+
+class Slowness:
+    """A factor for predictions, whatever single jobs take.
+
+    It stands in every client's waiting times: a file that takes a thousand times what was predicted
+    must not have everybody else refused for it.
+    """
+
+    def __init__(self) -> None:
+        self.factor = 1.0
+
+    def learn(self, predicted: float, spent: float) -> None:
+        """Compare a prediction with what it came to, in seconds."""
+        if spent > TELLING_SECONDS:
+            surprise = spent / (predicted * self.factor)
+            surprise = min(max(surprise, 1 / SURPRISE), SURPRISE)
+            self.factor *= surprise**LEARNING
+            self.factor = min(max(self.factor, 1 / MOST), MOST)

@@ -12,12 +12,11 @@ from typing import TypeVar
 
 from ..errors import ServiceError
 from .budget import FacesBudget
-from .costs import Cost
+from .costs import Cost, Slowness
 from .job import Job, State
 from .jobs import Done, Work
 from .pool import Workers
 from .progress import JobStopped
-from .slowness import Slowness
 from .turns import Lane, Turns, Waiting
 from .worker import JobFaultError
 

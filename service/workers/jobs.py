@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ..bodies.encodings import IDENTITY, decoded
-from ..bodies.media import Kind
+from ..bodies.media import IDENTITY, Kind, decoded
 from ..course import Course
 from ..errors import LimitError, NoModelError, check_limit
 from ..memory_cap import memory_cap

@@ -13,8 +13,7 @@ import msgspec
 from ..bodies.media import Kind
 from ..errors import ServiceError
 from ..gltf.constants import SURFACES, TRIANGLES
-from ..gltf.read.container import read_container
-from ..gltf.read.json_text import BOM, check_size, json_items
+from ..gltf.read.container import BOM, check_size, json_items, read_container
 from ..gltf.read.plan import joint_sets
 from ..meshfiles.counted import count_triangles
 from ..options import Limits
@@ -29,8 +28,6 @@ LEAST_VALUES = 1_000
 VALUES_PER_FURTHER_SET = 100
 # One that another primitive of its mesh has, and that is of zeros here.
 VALUES_PER_EMPTY_SET = 4
-
-
 # Of a sparse accessor all places are gone through each time it is read: forty cost as a value.
 PLACES_PER_VALUE = 40
 # Larger counts cost as this one: no file that is read has more of anything.

@@ -16,8 +16,8 @@ from pebble import ProcessExpired, ProcessPool
 
 from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
-from .ending import no_interrupt
 from .memory_file import MemoryFile
+from .worker import no_interrupt
 
 T = TypeVar("T")
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 import ctypes
 import gc
 import logging
+import multiprocessing
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TypeVar
 
 from .. import log_lines
 from ..errors import ServiceError
-from ..request_ids import REQUEST_ID
-from .ending import end_with_parent
+from ..log_lines import REQUEST_ID
 
 T = TypeVar("T")
 
@@ -29,6 +31,8 @@ MOST_PREFERRED = 1000
 # thousands of objects, hardly one of them in a cycle: to search them as often as usual is a fifth
 # of its time.
 OBJECTS_A_SEARCH = 50_000
+# What a terminal sends to the workers of a process too: Ctrl-C, and that it closes.
+OF_TERMINAL = {signal.SIGINT, signal.SIGHUP}
 
 
 class JobFaultError(Exception):
@@ -110,3 +114,32 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:
         trim(0)
+
+
+@contextmanager
+def no_interrupt() -> Iterator[None]:
+    """Keep these from threads and processes that are started inside: to end them is for whoever
+    starts them, and one that is still importing would say so at length."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
+    try:
+        # Python's own, which counts locks and is started with the first, lets Ctrl-C through.
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with_parent() -> None:
+    """End this process once the one that started it has ended, in whatever way, also inside a job.
+
+    One that is killed tells nobody; what it had begun would run on, beside the next one's.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def end() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=end, daemon=True).start()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pns_common import load_model
-from service.bodies.folder import folder_of
+from service.bodies.sibling_files import folder_of
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support import node_tools

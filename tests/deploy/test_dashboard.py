@@ -9,7 +9,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
 from service.http.server import DrainingServer
-from service.http.watch.scrapes import scrapes
+from service.http.watch.metrics import scrapes
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local

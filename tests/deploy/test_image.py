@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from fsspec.registry import known_implementations
 
 from service.settings import Settings
 
@@ -50,6 +51,13 @@ def test_what_the_service_names_is_in_the_image():
         named |= {normal(name) for name in re.findall(r'"([A-Za-z0-9._-]+)', block)}
     installed = set(pins(REQUIREMENTS[0])) | set(pins(REQUIREMENTS[2]))
     assert named - {"pns-subdivision"} <= installed
+
+
+@pytest.mark.parametrize(("extra", "protocol"), [("s3", "s3"), ("gcs", "gs"), ("azure", "abfs")])
+def test_each_extra_of_a_store_installs_what_its_urls_are_opened_by(extra, protocol):
+    project = (ROOT / "pyproject.toml").read_text()
+    (package,) = re.findall(rf'^{extra} = \["([a-z0-9]+)', project, re.MULTILINE)
+    assert known_implementations[protocol]["class"].partition(".")[0] == package
 
 
 def test_nothing_is_installed_without_a_hash():

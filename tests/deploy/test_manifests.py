@@ -13,8 +13,8 @@ from threading import Thread
 import pytest
 
 from service.http.app import create_app
-from service.http.result_room import KEPT_SHARE
-from service.http.watch.scrapes import scrapes
+from service.http.room import KEPT_SHARE
+from service.http.watch.metrics import scrapes
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local

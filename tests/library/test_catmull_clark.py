@@ -120,6 +120,17 @@ def test_every_crease_equals_opensubdiv(name, shape):
     np.testing.assert_allclose(refined.vertices[refined.faces], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("sharpness", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize("name", CREASES)
+def test_every_soft_crease_equals_opensubdiv(name, sharpness):
+    points, faces = SHAPES["mixed"]
+    points, pairs = uneven(points), np.array(CREASES[name])
+    creases = Creases(pairs, sharpness=np.full(len(pairs), sharpness), levels=1)
+    refined = refine(Mesh(points, faces), catmull_clark(), 2, creases=creases).mesh
+    expected, *_ = opensubdiv.catmull_clark(points, faces, 2, CREASES[name], sharpness=sharpness)
+    np.testing.assert_allclose(refined.vertices[refined.faces], expected, rtol=0, atol=1e-12)
+
+
 @given(
     st.one_of(polygon_manifolds(), polygon_soups(), manifolds()),
     st.integers(0, 2**31),

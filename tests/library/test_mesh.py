@@ -10,6 +10,7 @@ from hypothesis import given
 
 from pns_common import Mesh, MeshError, clean, loop, refine
 from tests.support.meshes import soups
+from tests.support.polygons import polygon_soups
 
 POINTS = np.eye(3)
 FACE = np.array([[0, 1, 2]])
@@ -106,6 +107,38 @@ def test_clean_keeps_each_set_of_three_vertices_once(mesh):
         assert new < 0 or kept[new] == sets[old]
 
 
+@given(polygon_soups())
+def test_clean_keeps_each_polygon_once(mesh):
+    faces = [face.tolist() for face in mesh.polygons]
+
+    def ways(face):
+        return {tuple(np.roll(way, k)) for way in (face, face[::-1]) for k in range(len(face))}
+
+    proper = [face for face in faces if len(set(face)) == len(face)]
+    firsts = [f for i, f in enumerate(proper) if not any(tuple(f) in ways(g) for g in proper[:i])]
+    if not firsts:
+        with pytest.raises(MeshError):
+            clean(mesh)
+        return
+    cleaned = clean(mesh)
+    back = np.flatnonzero(cleaned.vertex_map >= 0)
+    assert [back[face].tolist() for face in cleaned.mesh.polygons] == firsts
+    assert cleaned.dropped_degenerate == len(faces) - len(proper)
+    assert cleaned.dropped_duplicate == len(proper) - len(firsts)
+    for face, new in zip(faces, cleaned.representative.tolist(), strict=True):
+        assert (new < 0) == (face not in proper)
+        assert new < 0 or tuple(face) in ways(firsts[new])
+
+
+@pytest.mark.parametrize(
+    ("face", "message"),
+    [([], "0 corners"), ([3], "1 corners"), ([3, 4], "2 corners"), ([[0], [1, 2]], "lengths")],
+)
+def test_a_face_of_few_corners_is_named(face, message):
+    with pytest.raises(MeshError, match=message):
+        Mesh(np.eye(5, 3), [[0, 1, 2], [0, 2, 3, 4], face])
+
+
 def test_faces_of_any_degree_are_kept_and_named_in_errors():
     points = np.random.default_rng(0).standard_normal((6, 3))
     mesh = Mesh(points, [[0, 1, 2], [0, 2, 3, 4], [0, 4, 5]])
@@ -168,6 +201,13 @@ def test_a_saved_file_is_read_by_others(tmp_path):
         mesh.save(tmp_path / f"mesh.{ending}")
         read = trimesh.load_mesh(tmp_path / f"mesh.{ending}", process=False)
         np.testing.assert_allclose(read.triangles, mesh.vertices[mesh.faces], atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", ["stl", "off"])
+def test_polygons_are_not_lost_in_files_of_triangles(tmp_path, ending):
+    with pytest.raises(MeshError, match=r"triangulated\(\)"):
+        Mesh(np.eye(5, 3), PYRAMID).save(tmp_path / f"mesh.{ending}")
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_polygon_is_cut_from_its_first_corner():

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from pns_common.topology import EdgeClass, build_topology
-from service.bodies.folder import folder_of
+from service.bodies.sibling_files import folder_of
 from service.errors import ServiceError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld

@@ -1,8 +1,8 @@
-// OpenSubdiv's Catmull-Clark or Loop in double precision, with infinitely sharp creases.
+// OpenSubdiv's Catmull-Clark or Loop in double precision, with creases and sharp vertices.
 //
 // Standard input: the degree D of refined faces (4 or 3), counts V F C S and the levels; V points;
-// F faces, each its degree and its vertices; C creases, each two vertices; S vertices, each with its
-// sharpness. Standard output, for each corner of each refined face: its position, its limit and both
+// F faces, each its degree and its vertices; C creases, each two vertices and their sharpness; S
+// vertices, each with its sharpness. Standard output, for each corner of each refined face: its position, its limit and both
 // limit tangents. Faces come as the children of corner 0, 1, ... of face 0, 1, ..., level by level,
 // each from the old vertex on; in Loop's scheme the middle one last, from the first edge's vertex on.
 #include <opensubdiv/far/primvarRefiner.h>
@@ -12,15 +12,9 @@
 #include <memory>
 #include <vector>
 
-using namespace OpenSubdiv;
+#include "../../benchmarks/peers/driver.hpp"
 
-struct Point {
-    double x[3];
-    void Clear(void* = nullptr) { x[0] = x[1] = x[2] = 0; }
-    void AddWithWeight(const Point& from, double weight) {
-        for (int k = 0; k < 3; ++k) x[k] += weight * from.x[k];
-    }
-};
+using namespace OpenSubdiv;
 
 // A face by its number, and the place of our first corner among the library's.
 struct Face {
@@ -39,13 +33,13 @@ int main() {
         if (std::scanf("%d", &size) != 1) return 2;
         for (int i = 0, v; i < size && std::scanf("%d", &v) == 1; ++i) corners.push_back(v);
     }
-    for (int& v : pairs)
-        if (std::scanf("%d", &v) != 1) return 2;
+    std::vector<float> sharpness(creases);
+    for (int i = 0; i < creases; ++i)
+        if (std::scanf("%d %d %f", &pairs[2 * i], &pairs[2 * i + 1], &sharpness[i]) != 3) return 2;
     std::vector<int> tips(sharp);
     std::vector<float> of_tips(sharp);
     for (int i = 0; i < sharp; ++i)
         if (std::scanf("%d %f", &tips[i], &of_tips[i]) != 2) return 2;
-    const std::vector<float> sharpness(creases, Sdc::Crease::SHARPNESS_INFINITE);
 
     using Descriptor = Far::TopologyDescriptor;
     using Factory = Far::TopologyRefinerFactory<Descriptor>;

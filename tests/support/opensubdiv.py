@@ -27,20 +27,21 @@ def _driver():
     return (program, "") if built.returncode == 0 else (None, "OpenSubdiv: no libosd-dev here")
 
 
-def catmull_clark(points, faces, levels, creases=(), corners=()):
+def catmull_clark(points, faces, levels, creases=(), corners=(), sharpness=10):
     """Return (Q, 4) positions, limits and two limit tangents at the corners of refined quads.
 
-    ``corners`` are pairs: vertices, and at how many levels they are sharp, 10 and more for good.
+    ``creases`` are as sharp as ``sharpness``, at so many levels. ``corners`` are pairs: vertices,
+    and their sharpness. 10 and more is for good.
     """
-    return _refined(4, points, faces, levels, creases, corners)
+    return _refined(4, points, faces, levels, creases, corners, sharpness)
 
 
-def loop(points, faces, levels, creases=(), corners=()):
+def loop(points, faces, levels, creases=(), corners=(), sharpness=10):
     """Return what ``catmull_clark`` does, (T, 3) for triangles by Loop's scheme."""
-    return _refined(3, points, faces, levels, creases, corners)
+    return _refined(3, points, faces, levels, creases, corners, sharpness)
 
 
-def _refined(degree, points, faces, levels, creases, corners):
+def _refined(degree, points, faces, levels, creases, corners, sharpness):
     program, reason = _driver()
     if program is None:
         pytest.skip(reason)
@@ -48,7 +49,7 @@ def _refined(degree, points, faces, levels, creases, corners):
     lines = [" ".join(map(str, counts))]
     lines += [" ".join(f"{x:.17g}" for x in point) for point in points]
     lines += [" ".join(map(str, [len(face), *map(int, face)])) for face in faces]
-    lines += [f"{a} {b}" for a, b in creases]
+    lines += [f"{a} {b} {sharpness}" for a, b in creases]
     lines += [f"{v} {sharpness:.9g}" for v, sharpness in corners]
     ran = subprocess.run(
         [program], input="\n".join(lines), capture_output=True, text=True, check=True

@@ -44,5 +44,5 @@ def serve(pipe: Path) -> None:
 
 def refine_a_library(pipe: Path) -> None:
     """Have a worker of a batch do it."""
-    work = Work(hold_open_for, lambda task, error: None, 1, None)
+    work = Work(hold_open_for, lambda task, error: None, None)
     list(local.local(work, 1)(iter([Task(pipe)])))

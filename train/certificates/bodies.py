@@ -34,18 +34,21 @@ class Bodies:
         flat: in the plane z = 0, none folded.
         rough: one that would fold without a guard.
         regular: closed, and every vertex regular.
+        coarse: of few faces and sharp edges, so that it can be refined until none is kept sharp.
     """
 
     shaped: tuple[Body, ...]
     flat: tuple[Body, ...]
     rough: Body
     regular: Mesh
+    coarse: Body
 
 
 def triangle_bodies(seed: int) -> Bodies:
     """Return the meshes for rules over Loop."""
-    rough = Body("spiky sphere", spiky_sphere(seed))
-    return Bodies(synthetic_bodies(seed), flat_bodies(seed), rough, bumpy_torus(seed))
+    rough, coarse = Body("spiky sphere", spiky_sphere(seed)), capped_prism(4).triangulated()
+    shaped, flat = synthetic_bodies(seed), flat_bodies(seed)
+    return Bodies(shaped, flat, rough, bumpy_torus(seed), Body("prism of triangles", coarse))
 
 
 def polygon_bodies(seed: int) -> Bodies:
@@ -69,6 +72,7 @@ def polygon_bodies(seed: int) -> Bodies:
         ),
         rough=Body("spiky torus", shaken(torus, 0.3)),
         regular=torus,
+        coarse=Body("small prism", capped_prism(4)),
     )
 
 

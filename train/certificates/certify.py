@@ -14,7 +14,7 @@ from pns_common import ModelError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bases import LOOP
-from train.certificates.bodies import Body, polygon_bodies, triangle_bodies
+from train.certificates.bodies import Bodies, Body, polygon_bodies, triangle_bodies
 from train.certificates.displacement import bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
@@ -114,12 +114,12 @@ def scheme_steps(
         Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
         Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
         Step("T8", "planar spectrum", lambda: planar_spectrum(subject, valences)),
-        *_steps_of_kind(subject, every, bodies.rough, seed, valences),
+        *_steps_of_kind(subject, every, bodies, seed, valences),
     ]
 
 
 def _steps_of_kind(
-    subject: Subject, bodies: Sequence[Body], rough_body: Body, seed: int, valences: Sequence[int]
+    subject: Subject, every: Sequence[Body], bodies: Bodies, seed: int, valences: Sequence[int]
 ) -> list[Step]:
     """Return the certificates that a kind of scheme has.
 
@@ -127,13 +127,13 @@ def _steps_of_kind(
     """
     if subject.learned_once is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
-    rough = (*bodies, rough_body)
+    rough = (*every, bodies.rough)
     return [
         Step("folds", "fold-free", lambda: fold_free(subject, rough, seed)),
         Step("turns", "turns of neighbours", lambda: neighbour_turns(subject, rough, seed)),
         Step("limit", "limit distance", lambda: limit_distance(subject, rough, seed)),
-        Step("class", "smoothness class", lambda: smoothness_class(subject, bodies)),
-        Step("scale", "resolution independence", lambda: resolution_independence(subject, bodies)),
+        Step("class", "smoothness class", lambda: smoothness_class(subject, [bodies.coarse])),
+        Step("scale", "resolution independence", lambda: resolution_independence(subject, every)),
     ]
 
 

@@ -10,8 +10,8 @@ from ...errors import GltfError, UnsupportedFeature
 from ...report import Change
 from ..constants import COMPONENT_TYPES, FLOAT, SURFACES, UNSIGNED_BYTE, UNSIGNED_SHORT
 from .accessors import QUANTIZATION, allowed, is_dequantised, needs_extension
+from .container import escaped
 from .extensions import KNOWN
-from .json_text import escaped
 from .schema import Accessor, Asset, Document, Primitive, checked
 
 LEAST_STRIDE, MOST_STRIDE = 4, 252

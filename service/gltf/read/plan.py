@@ -12,7 +12,7 @@ from ...errors import GltfError, UnrefinableError, check_limit
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ..constants import SURFACES, TRIANGLES
 from .accessors import element_size
-from .json_text import encode
+from .container import encode
 from .schema import Document, Primitive
 
 # Peak bytes for each refined face: at least 1.15 times what was measured on generated meshes of

@@ -13,7 +13,7 @@ from ...errors import GltfError
 from ...report import Change
 from ..constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
 from .accessors import element_size
-from .json_text import escaped
+from .container import escaped
 from .schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
 
 

@@ -13,9 +13,8 @@ from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ...report import Change
 from .checks import breaches, refuse_features, refuse_version
 from .compressed import decode_primitives, decode_views
-from .container import Container, read_container
+from .container import Container, decode_object, decoded_size, read_container
 from .extensions import leave_out_vertex_numbers, unknown_extensions
-from .json_text import decode_object, decoded_size
 from .plan import MeshPlan, Spare, check_cost, plan, repeated_text, spare
 from .references import check_nodes, check_references
 from .resources import embed_images, resolve_buffers

@@ -7,7 +7,6 @@ normals are those of the surface that it makes, and its tangents are perpendicul
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.grid import rounded_rows
-from pns_common.normals import count_opposed, perpendicular_tangents
+from pns_common.normals import perpendicular_tangents
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import marked
 
@@ -23,7 +22,6 @@ from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
-from ...report import Change
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
 from .columns import SkinAndMorph, skin_attributes
@@ -207,24 +205,6 @@ def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvB
         else:
             refined[name] = blend(name, own, corners, primitive.accessors[name])
     return refined
-
-
-def opposed_normals(refined: Sequence[RefinedPrimitive], pointer: str) -> list[Change]:
-    """Return how many normals of each primitive of the mesh at `pointer` oppose their face."""
-    blocks = Blocks(available_threads())
-    counts = {
-        part.source.number: count_opposed(
-            part.attributes["POSITION"], part.attributes["NORMAL"], part.faces, blocks
-        )
-        for part in refined
-        if "NORMAL" in part.attributes
-    }
-    what = "corners with a normal that points away from their face's front"
-    return [
-        Change(f"{pointer}/primitives/{number}", what, count)
-        for number, count in counts.items()
-        if count
-    ]
 
 
 def _target(

@@ -16,8 +16,7 @@ from pns_common.rows import distinct_rows, dot, norm, unit
 
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import blocks_of
-from ...meshes.weld import Weld, weld, weld_by_label
-from ...meshes.weld_tolerance import WHOLE, weld_within
+from ...meshes.weld import WHOLE, Weld, weld, weld_by_label, weld_within
 from ...options import Options
 from ..read.primitives import TrianglePrimitive
 from .columns import SkinAndMorph, read_skin_and_morph

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from pns_common.columns import level_topologies
-from pns_common.creases import NO_CREASES, Creases
+from pns_common.creases import NO_CREASES, Creases, edge_cosines
 from pns_common.errors import MeshError
 from pns_common.matrix import SubdivisionMatrix
 from pns_common.mesh import Mesh
@@ -22,11 +22,7 @@ from pns_common.topology import Topology, split_faces
 
 from ...course import Course
 from ...errors import UnrefinableError
-from ...meshes.far_from_origin import STEPS, faces_too_far
-from ...meshes.shape_creases import creases_by_shape
 from ...options import Options
-from ...report import Change
-from ..read.primitives import TrianglePrimitive
 from .columns import SkinAndMorph, refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
@@ -259,29 +255,15 @@ def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, 
     return {RATIO: values[:, 0], GATE: values[:, 1]}
 
 
-def changes_of_primitive(
-    primitive: TrianglePrimitive, kept: Bool[np.ndarray, " F"], levels: int, pointer: str
-) -> list[Change]:
-    """Return the dropped faces of a primitive of the mesh at `pointer`, and those too far away."""
-    pointer = f"{pointer}/primitives/{primitive.number}"
-    if not kept.any():
-        return [Change(pointer, "left as it was: no face has an area", len(kept))]
-    dropped = int((~kept).sum())
-    faces = primitive.corners if dropped == 0 else primitive.corners[kept]
-    far = 0
-    if not primitive.is_double:
-        far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
-    counts = {
-        "degenerate faces dropped": dropped,
-        f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,
-    }
-    return [Change(pointer, what, count) for what, count in counts.items() if count]
+def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
+    """Return the edges of a mesh that the options keep sharp by its shape, by name.
 
-
-def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
-    """Return the number of joined vertices of a mesh, and of refined ones that lost a joint."""
-    counts = {
-        "vertices joined within weld_tolerance": near,
-        "refined vertices that lost their lightest joints": cut,
-    }
-    return [Change(pointer, what, count) for what, count in counts.items() if count]
+    With `crease=auto` these are the scheme's: none for Loop and models of format 1.
+    """
+    if options.crease == "auto" and scheme.creases.finds:
+        return creases_by_name(mesh, scheme.creases, scheme)
+    if options.crease_angle is None:
+        return NO_CREASES
+    topology = mesh.topology()
+    rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
+    return Creases(topology.edges[rows].astype(np.int64))

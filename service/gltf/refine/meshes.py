@@ -4,41 +4,42 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
-from jaxtyping import Bool
 
 from pns_common.matrix import SubdivisionMatrix
 from pns_common.progress import LEARNED_COST
-from pns_common.report import Report
 from pns_common.schemes import Scheme
 
-from ...advice import NO_BENDS, Bends, count_bends
+from ...advice import NO_BENDS, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Options
-from ...report import Change
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
-from .attributes import RefinedPrimitive, opposed_normals, refined_primitives
+from .attributes import RefinedPrimitive, refined_primitives
+from .changes import (
+    changes_of_primitive,
+    changes_of_vertices,
+    near_miss_changes,
+    near_misses,
+    opposed_normals,
+)
 from .control_mesh import ControlMesh, control_mesh
 from .level_one import refined_polygons
 from .mesh_refine import (
-    changes_of_primitive,
-    changes_of_vertices,
     creases_of,
     refined_mesh,
     sharp_after,
 )
-from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_rule, with_smooth_normals
 from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces
-from .together import StageShares, kind_of, refine_together
+from .together import MeshOutcome, StageShares, kind_of, refine_together
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
 MOST_FACES = 2**15
@@ -49,48 +50,6 @@ GROUP_FACES = 2**17
 # on a part of 2,000 faces with normals and texture coordinates at four and five levels.
 READ, WELD, LIMIT, ATTRIBUTES = 0.05, 0.05, 2.0, 1.7
 WRITE = {"none": 0.1, "meshopt": 2.5, "draco": 25.0}
-
-
-@dataclass(frozen=True, eq=False)
-class MeshOutcome:
-    """A refined mesh.
-
-    Attributes:
-        index: its place in `meshes`.
-        primitives: its triangle primitives.
-        kept: for each primitive, which faces have three different welded vertices.
-        refined: the primitives that have a face left.
-        copies: number of faces with the vertices of an earlier face.
-        report: the operator's; None if no face was left.
-        changes: what was joined, dropped or cut.
-        bends: bent edges, and the sharp ones among them.
-        parents: what each refined vertex is made of, if asked for: rows of the primitives, one
-            primitive after the other.
-    """
-
-    index: int
-    primitives: Sequence[TrianglePrimitive]
-    kept: Sequence[Bool[np.ndarray, " F"]]
-    refined: Sequence[RefinedPrimitive]
-    copies: int
-    report: Report | None
-    changes: list[Change]
-    bends: Bends = NO_BENDS
-    parents: SubdivisionMatrix | None = None
-
-    @property
-    def degenerate(self) -> int:
-        """Number of faces without three different vertices."""
-        return sum(int((~keep).sum()) for keep in self.kept)
-
-    def of(self, mesh: int) -> MeshOutcome:
-        """Return the outcome of another mesh with this geometry."""
-        before, after = (f"/meshes/{index}" for index in (self.index, mesh))
-        moved = [
-            Change(after + change.pointer.removeprefix(before), change.what, change.count)
-            for change in self.changes
-        ]
-        return replace(self, index=mesh, changes=moved)
 
 
 def refined_meshes(
@@ -228,22 +187,10 @@ def _together(
     outcomes: dict[int, MeshOutcome] = {}
     for number, places in enumerate(groups.values()):
         meshes = [read[place] for place in places]
-        pointers = [f"/meshes/{window[place].mesh}" for place in places]
+        numbers = [window[place].mesh for place in places]
         with course.part(number / len(groups), (number + 1) / len(groups)):
-            made = refine_together(meshes, pointers, scheme, options, course, shares)
-        for place, part in zip(places, made, strict=True):
-            if part is not None:
-                outcomes[place] = MeshOutcome(
-                    index=window[place].mesh,
-                    primitives=read[place],
-                    kept=part.kept,
-                    refined=part.refined,
-                    copies=part.copies,
-                    report=part.report,
-                    changes=part.changes
-                    + opposed_normals(part.refined, f"/meshes/{window[place].mesh}"),
-                    bends=part.bends,
-                )
+            made = refine_together(meshes, numbers, scheme, options, course, shares)
+        outcomes |= {p: o for p, o in zip(places, made, strict=True) if o is not None}
     return outcomes
 
 

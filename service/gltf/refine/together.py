@@ -16,6 +16,7 @@ from jaxtyping import Bool, Int
 
 from pns_common.creases import Creases
 from pns_common.errors import MeshError
+from pns_common.matrix import SubdivisionMatrix
 from pns_common.report import Report
 from pns_common.rows import disjoint_faces
 from pns_common.schemes import Scheme
@@ -29,17 +30,21 @@ from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .attributes import Columns, RefinedPrimitive, refined_primitives
+from .changes import (
+    changes_of_primitive,
+    changes_of_vertices,
+    near_miss_changes,
+    near_misses,
+    opposed_normals,
+)
 from .columns import COLUMNS, skin_sets
 from .control_mesh import ControlMesh, Parts, control_mesh, slices
 from .mesh_refine import (
     RefinedMesh,
-    changes_of_primitive,
-    changes_of_vertices,
     creases_of,
     refined_union,
     sharp_after,
 )
-from .near_misses import near_miss_changes, near_misses
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 
 
@@ -54,24 +59,45 @@ class StageShares:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """A refined mesh of a union.
+class MeshOutcome:
+    """A refined mesh.
 
     Attributes:
-        refined: its primitives that have a face left.
+        index: its place in `meshes`.
+        primitives: its triangle primitives.
         kept: for each primitive, which faces have three different welded vertices.
+        refined: the primitives that have a face left.
         copies: number of faces with the vertices of an earlier face.
-        report: the operator's.
+        report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
         bends: bent edges, and the sharp ones among them.
+        parents: what each refined vertex is made of, if asked for: rows of the primitives, one
+            primitive after the other.
     """
 
-    refined: list[RefinedPrimitive]
-    kept: list[Bool[np.ndarray, " F"]]
+    index: int
+    primitives: Sequence[TrianglePrimitive]
+    kept: Sequence[Bool[np.ndarray, " F"]]
+    refined: Sequence[RefinedPrimitive]
     copies: int
-    report: Report
+    report: Report | None
     changes: list[Change]
     bends: Bends = NO_BENDS
+    parents: SubdivisionMatrix | None = None
+
+    @property
+    def degenerate(self) -> int:
+        """Number of faces without three different vertices."""
+        return sum(int((~keep).sum()) for keep in self.kept)
+
+    def of(self, mesh: int) -> MeshOutcome:
+        """Return the outcome of another mesh with this geometry."""
+        before, after = (f"/meshes/{index}" for index in (self.index, mesh))
+        moved = [
+            Change(after + change.pointer.removeprefix(before), change.what, change.count)
+            for change in self.changes
+        ]
+        return replace(self, index=mesh, changes=moved)
 
 
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
@@ -119,13 +145,13 @@ def _joint_blocks(primitives: Sequence[TrianglePrimitive]) -> int:
 
 def refine_together(
     meshes: Sequence[Sequence[TrianglePrimitive]],
-    pointers: Sequence[str],
+    numbers: Sequence[int],
     scheme: Scheme,
     options: Options,
     course: Course,
     shares: StageShares,
-) -> list[Part | None]:
-    """Refine meshes of one kind, given by their primitives; `pointers` are their places.
+) -> list[MeshOutcome | None]:
+    """Refine meshes of one kind, given by their primitives; `numbers` are their places in the file.
 
     None for a mesh that must be refined alone: it has no face left or no extent, or it cannot be
     refined, which is then reported.
@@ -136,7 +162,7 @@ def refine_together(
         control = control_mesh(primitives, options, parts)
     able = _able(control, parts)
     if control.is_empty or not able.all():
-        return _chosen(able, meshes, pointers, scheme, options, course, shares)
+        return _chosen(able, meshes, numbers, scheme, options, course, shares)
     with course.stage("weld", shares.weld, shares.refine):
         creases = creases_of(control, options, scheme, parts)
         if options.normals != "keep":
@@ -150,7 +176,7 @@ def refine_together(
                 return [None]
             half = np.arange(len(meshes)) < len(meshes) // 2
             first, second = (
-                _chosen(each, meshes, pointers, scheme, options, course, shares)
+                _chosen(each, meshes, numbers, scheme, options, course, shares)
                 for each in (half, ~half)
             )
             return [one or other for one, other in zip(first, second, strict=True)]
@@ -159,7 +185,7 @@ def refine_together(
         pieces = refined_primitives(control, made, grid, blend, course)
         part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
         bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
-        cut = _divided(control, parts, made, pieces, meshes, pointers, options)
+        cut = _divided(control, parts, made, pieces, meshes, numbers, options)
         return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 
 
@@ -177,17 +203,17 @@ def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
 def _chosen(
     chosen: Bool[np.ndarray, " P"],
     meshes: Sequence[Sequence[TrianglePrimitive]],
-    pointers: Sequence[str],
+    numbers: Sequence[int],
     scheme: Scheme,
     options: Options,
     course: Course,
     shares: StageShares,
-) -> list[Part | None]:
+) -> list[MeshOutcome | None]:
     """Refine some of the meshes together; None for the others."""
-    made: list[Part | None] = [None] * len(meshes)
+    made: list[MeshOutcome | None] = [None] * len(meshes)
     places = np.flatnonzero(chosen).tolist()
     if places:
-        own, theirs = [meshes[place] for place in places], [pointers[place] for place in places]
+        own, theirs = [meshes[place] for place in places], [numbers[place] for place in places]
         parts = refine_together(own, theirs, scheme, options, course, shares)
         for place, part in zip(places, parts, strict=True):
             made[place] = part
@@ -250,9 +276,9 @@ def _divided(
     made: RefinedMesh,
     pieces: Sequence[RefinedPrimitive],
     meshes: Sequence[Sequence[TrianglePrimitive]],
-    pointers: Sequence[str],
+    numbers: Sequence[int],
     options: Options,
-) -> list[Part]:
+) -> list[MeshOutcome]:
     """Cut the refined primitives of the union into those of its parts."""
     cleaned = control.cleaned
     copied = (cleaned.representative >= 0) & (cleaned.face_map < 0)
@@ -275,24 +301,29 @@ def _divided(
     lengths = [report["reference_length"] for report in made.reports]
     of_vertex = parts.of_row[control.vertex_rows()]
     misses = near_misses(control.mesh.vertices, control.mesh.topology(), lengths, of_vertex)
-    return [
-        Part(
-            refined=refined[part],
-            kept=[keep[part] for keep in kept],
-            copies=copies[part],
-            report=made.reports[part],
-            changes=[
-                change
-                for primitive, keep in zip(primitives, kept, strict=True)
-                for change in changes_of_primitive(
-                    primitive, keep[part], options.levels, pointers[part]
-                )
-            ]
-            + changes_of_vertices(near[part], int(made.cut[part]), pointers[part])
-            + near_miss_changes(misses[part], pointers[part]),
+    outcomes: list[MeshOutcome] = []
+    for part, (number, primitives) in enumerate(zip(numbers, meshes, strict=True)):
+        pointer, own = f"/meshes/{number}", [keep[part] for keep in kept]
+        changes = [
+            change
+            for primitive, keep in zip(primitives, own, strict=True)
+            for change in changes_of_primitive(primitive, keep, options.levels, pointer)
+        ]
+        changes += changes_of_vertices(near[part], int(made.cut[part]), pointer)
+        changes += near_miss_changes(misses[part], pointer)
+        changes += opposed_normals(refined[part], pointer)
+        outcomes.append(
+            MeshOutcome(
+                index=number,
+                primitives=primitives,
+                kept=own,
+                refined=refined[part],
+                copies=copies[part],
+                report=made.reports[part],
+                changes=changes,
+            )
         )
-        for part, primitives in enumerate(meshes)
-    ]
+    return outcomes
 
 
 def _divided_primitive(

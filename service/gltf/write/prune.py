@@ -86,11 +86,7 @@ def cut(
     Whole words are cut, so that the rest stays aligned. Also returns (end, bytes removed so far) of
     each cut, ascending, for `moved`.
     """
-    cuts = [
-        (start + -start % 4, end - end % 4)
-        for start, end in _without(_merged(gone), _merged(needed))
-        if end - end % 4 > start + -start % 4
-    ]
+    cuts = _cuts(gone, needed) if len(gone) else []
     result: list[bytes | memoryview] = []
     shifts: list[tuple[int, int]] = []
     removed, position, upcoming = 0, 0, iter([*cuts, (NEVER, NEVER)])
@@ -121,32 +117,16 @@ def moved(offsets: Sequence[int], shifts: Sequence[tuple[int, int]]) -> list[int
     return after
 
 
-def _merged(ranges: Int[np.ndarray, "N 2"]) -> list[tuple[int, int]]:
-    """Return disjoint, ascending ranges with the same union."""
-    starts, ends = ranges.T
-    order = np.argsort(starts)
-    starts, ends = starts[order], np.maximum.accumulate(ends[order])
-    opens, closes = (np.ones(len(starts), dtype=bool) for _ in range(2))
-    opens[1:] = closes[:-1] = starts[1:] > ends[:-1]
-    return list(zip(starts[opens].tolist(), ends[closes].tolist(), strict=True))
-
-
-def _without(ranges: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return the difference of two lists of disjoint, ascending ranges."""
-    left: list[tuple[int, int]] = []
-    place = 0
-    for start, end in ranges:
-        while place < len(others) and others[place][1] <= start:
-            place += 1
-        index = place
-        while index < len(others) and others[index][0] < end:
-            if others[index][0] > start:
-                left.append((start, others[index][0]))
-            start = max(start, others[index][1])
-            index += 1
-        if start < end:
-            left.append((start, end))
-    return left
+def _cuts(gone: Int[np.ndarray, "N 2"], needed: Int[np.ndarray, "M 2"]) -> list[tuple[int, int]]:
+    """Return the runs of words of which every byte is in `gone` and none in `needed`."""
+    first = int(gone.min()) // 4 * 4
+    kept = np.ones(int(gone.max()) - first, dtype=bool)
+    for ranges, keeps in ((gone, False), (needed, True)):
+        for start, end in np.maximum(ranges - first, 0).tolist():
+            kept[start:end] = keeps
+    words = kept[: len(kept) // 4 * 4].reshape(-1, 4).any(axis=1)
+    turns = first + 4 * np.flatnonzero(np.diff(words, prepend=True, append=True))
+    return list(zip(turns[::2].tolist(), turns[1::2].tolist(), strict=True))
 
 
 @dataclass

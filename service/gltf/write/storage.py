@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+
+from pns_common.matrix import SubdivisionMatrix
 
 from ...report import Change
 from ..constants import FAN, FLOAT, NGONS, STRIP, SURFACES
@@ -12,6 +18,7 @@ from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import withdraw
 from ..read.plan import MeshPlan, Spare
 from ..read.schema import Document, Mesh, Primitive
+from ..refine.together import MeshOutcome
 from .writer import Writer
 
 # The report is `asset.extras.pns`. Extras may be any JSON value; one that is no object moves to
@@ -19,6 +26,9 @@ from .writer import Writer
 REPORT_KEY, OLD_VALUE_KEY = "pns", "extras"
 
 _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
+
+
+Arrays = dict[str, Shaped[np.ndarray, "..."]]
 
 
 def storage_changes(document: Document, plans: Sequence[MeshPlan]) -> list[Change]:
@@ -124,3 +134,42 @@ def same_geometry(document: Document, meshes: Iterable[int]) -> dict[int, list[i
 def _geometry(primitive: Primitive) -> Hashable:
     targets = tuple(tuple(target.items()) for target in primitive.targets)
     return primitive.mode, primitive.indices, tuple(primitive.attributes.items()), targets
+
+
+def matrix_arrays(parents: SubdivisionMatrix, under: str = "") -> Arrays:
+    """Return a matrix as `scipy.sparse.load_npz` reads it, with `under` before each name."""
+    parts = {
+        "format": np.array(b"csr"),
+        "shape": np.array(parents.shape),
+        "data": parents.weights,
+        "indices": parents.columns,
+        "indptr": parents.starts,
+    }
+    return {f"{under}{name}": values for name, values in parts.items()}
+
+
+def parents_of_mesh(document: Document, mesh: MeshOutcome) -> Arrays:
+    """Return a matrix for each refined primitive of a mesh that was traced.
+
+    A row is a vertex written. Columns are the elements of the POSITION accessors of all primitives
+    of the mesh, one primitive after the other; `offsets` says where those of each begin.
+    """
+    counts = [
+        document.accessors[primitive.attributes["POSITION"]].count
+        if "POSITION" in primitive.attributes
+        else 0
+        for primitive in document.meshes[mesh.index].primitives
+    ]
+    offsets = np.cumsum([0, *counts])
+    arrays = {f"meshes/{mesh.index}/offsets": offsets}
+    if mesh.parents is None:
+        return arrays
+    elements = np.concatenate([own.rows + offsets[own.number] for own in mesh.primitives])
+    for refined in mesh.refined:
+        if refined.vertex is None:
+            raise ValueError("a mesh of a union is not traced")
+        own = mesh.parents.take(refined.vertex)
+        own = replace(own, columns=elements[own.columns], shape=(own.shape[0], int(offsets[-1])))
+        under = f"meshes/{mesh.index}/primitives/{refined.source.number}/"
+        arrays |= matrix_arrays(own, under)
+    return arrays

@@ -13,8 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...errors import BusyError, ServiceError, UnauthorizedError
 from .. import problems
-from ..addresses import sites
-from ..clients import Client
+from ..clients import Client, sites
 from .keys import NAME, PREFIX, Entry, Keyring
 
 log = logging.getLogger("pns.service")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from functools import partial
 from typing import Annotated, Any
 
@@ -15,12 +16,11 @@ from ...bodies import media
 from ...errors import ServiceError
 from ...workers.job import State
 from .. import documentation, problems
-from ..answer import FileAnswer
-from ..answer_headers import answer_type, server_timing
+from ..answer import FileAnswer, answer_type, server_timing
 from ..clients import client_of
 from ..parameters import Parameters
 from ..service import Service
-from .book import Entry, NotDoneError
+from .book import NotDoneError
 from .store import ANSWER, REPORT
 from .work import hand_in, shown
 
@@ -42,14 +42,14 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}", **documentation.JOB)
     async def read_job(request: Request, job_id: str) -> Response:
-        view = await _view(service, request, job_id)
+        view = await _view(service, client(request), job_id)
         return JSONResponse(view, headers={"Cache-Control": "no-store"})
 
     @routes.get("/jobs/{job_id}/events", response_class=StreamingResponse, **documentation.EVENTS)
     async def read_job_events(request: Request, job_id: str) -> Response:
-        await _view(service, request, job_id)
+        await _view(service, client(request), job_id)
         return StreamingResponse(
-            _events(service, request, job_id),
+            _events(service, client(request), job_id),
             media_type="text/event-stream",
             # A proxy that collects the stream (nginx) would keep it until its end.
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
@@ -57,32 +57,37 @@ def router(service: Service) -> APIRouter:
 
     @routes.get("/jobs/{job_id}/result", response_class=Response, **documentation.RESULT)
     async def read_job_result(request: Request, job_id: str) -> Response:
-        kind = (await _view(service, request, job_id))["format"]
-        file_type = answer_type(request, media.MEDIA_TYPES[kind])
-        return await _result(service, request, job_id, file_type)
+        whose = client(request)
+        view = await _view(service, whose, job_id)
+        kind = answer_type(request, media.MEDIA_TYPES[view["format"]])
+        return await _result(service, whose, job_id, view, kind)
 
     @routes.get("/jobs/{job_id}/report", response_class=Response, **documentation.JOB_REPORT)
     async def read_job_report(request: Request, job_id: str) -> Response:
-        return await _result(service, request, job_id, media.JSON)
+        whose = client(request)
+        view = await _view(service, whose, job_id)
+        return await _result(service, whose, job_id, view, media.JSON)
 
     @routes.delete("/jobs/{job_id}", status_code=204, **documentation.DELETE_JOB)
     async def delete_job(request: Request, job_id: str) -> Response:
-        await _delete(service, request, job_id)
+        await _delete(service, client(request), job_id)
         return Response(status_code=204)
+
+    def client(request: Request) -> str:
+        return client_of(request, service.settings).id
 
     return routes
 
 
-async def _events(service: Service, request: Request, job_id: str) -> AsyncIterator[str]:
+async def _events(service: Service, client: str, job_id: str) -> AsyncIterator[str]:
     """Yield the job as server-sent events, one for each change, until it has ended."""
     said, silent = "", 0.0
     while True:
         try:
-            view = await _view(service, request, job_id)
+            view = await _view(service, client, job_id)
         except ServiceError:
             # It is forgotten, or the store is away: who follows it asks again.
             return
-        ended = State(view["state"]).ended
         now = json.dumps(view, separators=(",", ":"))
         if now != said:
             said, silent = now, 0.0
@@ -90,32 +95,29 @@ async def _events(service: Service, request: Request, job_id: str) -> AsyncItera
         elif silent >= SILENT_SECONDS:
             silent = 0.0
             yield ": still there\n\n"
-        if ended:
+        if State(view["state"]).ended:
             return
-        try:
+        with suppress(TimeoutError):
             async with asyncio.timeout(LOOK_SECONDS):
                 if service.shared is None and service.book.has(job_id):
-                    await _entry(service, request, job_id).job.ended.wait()
+                    await service.book.find(job_id, client).job.ended.wait()
                 else:
                     await asyncio.sleep(LOOK_SECONDS)
-        except TimeoutError:
-            pass
         silent += LOOK_SECONDS
 
 
-async def _view(service: Service, request: Request, job_id: str) -> dict[str, Any]:
+async def _view(service: Service, client: str, job_id: str) -> dict[str, Any]:
     """Return a job as its client sees it, whichever replica works on it. Raises ServiceError."""
     if service.shared is None or service.book.has(job_id):
-        return shown(service, _entry(service, request, job_id).job)
-    client = client_of(request, service.settings)
-    return (await service.shared.find(job_id, client.id)).view
+        return shown(service, service.book.find(job_id, client).job)
+    return (await service.shared.find(job_id, client)).view
 
 
-async def _delete(service: Service, request: Request, job_id: str) -> None:
+async def _delete(service: Service, client: str, job_id: str) -> None:
     """Cancel a job, or forget one that has ended. Raises ServiceError."""
     shared = service.shared
     if shared is None or service.book.has(job_id):
-        entry = _entry(service, request, job_id)
+        entry = service.book.find(job_id, client)
         ended = entry.job.state.ended
         if not ended and entry.task is not None:
             entry.cancelled = True
@@ -124,22 +126,23 @@ async def _delete(service: Service, request: Request, job_id: str) -> None:
             return
         service.book.forget(job_id)
     else:
-        record = await shared.find(job_id, client_of(request, service.settings).id)
+        record = await shared.find(job_id, client)
         ended = State(record.view["state"]).ended
     if shared is not None:
         await (shared.store.delete if ended else shared.store.cancel)(job_id)
 
 
-async def _result(service: Service, request: Request, job_id: str, kind: str) -> Response:
+async def _result(
+    service: Service, client: str, job_id: str, view: dict[str, Any], kind: str
+) -> Response:
     """Answer with a file of a job, or the problem that it failed with. Raises ServiceError."""
-    client = client_of(request, service.settings).id
-    view = await _view(service, request, job_id)
     if view["state"] == State.FAILED and view["problem"] is not None:
         problem = view["problem"]
         # What failed a while ago for want of room may find some.
         headers = {"Retry-After": "1"} if problem["status"] == 503 else None
         return problems.ProblemResponse(problem, problem["status"], headers)
-    _check_done(view["state"])
+    if view["state"] != State.DONE:
+        raise NotDoneError(f"the job is {view['state']}")
     sent, timing = (lambda: None), {}
     if service.shared is not None and not service.book.has(job_id):
         file = await service.shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
@@ -160,12 +163,3 @@ async def _result(service: Service, request: Request, job_id: str, kind: str) ->
         headers=timing | {"Cache-Control": "no-store"},
         sent=sent,
     )
-
-
-def _check_done(state: str) -> None:
-    if state != State.DONE:
-        raise NotDoneError(f"the job is {state}")
-
-
-def _entry(service: Service, request: Request, job_id: str) -> Entry:
-    return service.book.find(job_id, client_of(request, service.settings).id)

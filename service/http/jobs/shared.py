@@ -14,8 +14,8 @@ from ...options import Options
 from ...workers.job import Job, State
 from ...workers.memory_file import MemoryFile
 from .. import problems
-from ..intake import Asked, Wanted, asked_of, made_of
-from ..result_room import result_folder
+from ..intake import Wanted, made_of
+from ..room import result_folder
 from .book import Entry, NoSuchJobError
 from .room import Kept, Room
 from .store import (
@@ -32,6 +32,9 @@ from .store import (
 
 if TYPE_CHECKING:
     from ..service import Service
+
+# Of a job's work what a request names, beside its options.
+ASKED = ("model", "target", "content_type", "encoding", "request_id")
 
 View = Callable[[Job], dict[str, Any]]
 
@@ -79,8 +82,9 @@ class SharedJobs:
 
     async def publish(self, job: Job, owner: str | None) -> None:
         """Make a job known to other replicas, with its body. Raises StoreError, StoreFullError."""
-        asked, view = asdict(asked_of(job)), self._view(job)
-        await self.store.create(job.id, owner, asked, view, job.body.pieces())
+        asked = {name: getattr(job.work, name) for name in ASKED}
+        asked |= {"client": job.client, "options": asdict(job.work.options)}
+        await self.store.create(job.id, owner, asked, self._view(job), job.body.pieces())
 
     async def beat(self, entry: Entry) -> None:
         """Keep a job leased until its end is stored; end it where its client wants that."""
@@ -212,8 +216,8 @@ class SharedJobs:
                     return True
                 counted.grow(body.size)
                 options = Options(**record.asked["options"])
-                fields: dict[str, Any] = record.asked | {"options": options}
-                job = made_of(settings, Asked(**fields), body, wanted)
+                asked: dict[str, Any] = record.asked | {"options": options}
+                job = made_of(settings, body, wanted, **asked)
                 files.pop_all()
             held.callback(job.close)
             job.id = record.id

@@ -12,13 +12,12 @@ import os
 import secrets
 import socket
 import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from errno import ENOSPC
-from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from ...errors import BusyError
 from ...settings import Settings, StartError
@@ -113,22 +112,6 @@ class Record:
     replica: str
 
 
-class Files(Protocol):
-    """Place of bodies and results."""
-
-    async def write(self, name: str, pieces: Iterable[bytes], seconds: float) -> None:
-        """Keep a file, for so many seconds at least."""
-        ...
-
-    async def read(self, name: str, into: MemoryFile) -> bool:
-        """Append a file to another; return whether there is one."""
-        ...
-
-    async def delete(self, *names: str) -> None:
-        """Delete files; those that are not there are no error."""
-        ...
-
-
 class RedisFiles:
     """Files as values of Redis, which deletes them in time.
 
@@ -169,12 +152,12 @@ class RedisFiles:
         return bool(size or await self._redis.exists(key))
 
     async def delete(self, *names: str) -> None:
-        """Delete files."""
+        """Delete files; those that are not there are no error."""
         await self._redis.delete(*(f"{PREFIX}{name}" for name in names))
 
 
 class BucketFiles:
-    """Files in a bucket or a folder, by fsspec; a rule of the bucket is to delete old ones."""
+    """Bodies and results in a bucket or a folder, by fsspec; a rule of it is to delete old ones."""
 
     def __init__(self, url: str) -> None:
         import fsspec
@@ -199,7 +182,7 @@ class BucketFiles:
         return True
 
     async def delete(self, *names: str) -> None:
-        """Delete files."""
+        """Delete files; those that are not there are no error."""
         for name in names:
             try:
                 await asyncio.to_thread(self._system.rm_file, self._path(name))
@@ -221,7 +204,7 @@ class JobStore:
             raise StartError(
                 "PNS_STORE is set and redis is not installed: pip install 'pns-subdivision[store]'"
             ) from error
-        self._reached = partial(_Reached, (RedisError, OSError), OutOfMemoryError)
+        self._errors, self._full = (RedisError, OSError), OutOfMemoryError
         # Its types leave open whether it answers with bytes.
         self._redis: Any = Redis.from_url(
             str(settings.store), socket_timeout=STORE_SECONDS, socket_connect_timeout=STORE_SECONDS
@@ -233,7 +216,7 @@ class JobStore:
         self._seconds = settings.queue_seconds + settings.job_seconds + settings.result_seconds
         self._result_seconds = settings.result_seconds
         self._promised_seconds = min(settings.promised_seconds, settings.result_seconds)
-        self._files: Files = (
+        self._files = (
             RedisFiles(self._redis)
             if settings.store_files is None
             else BucketFiles(settings.store_files)
@@ -254,7 +237,7 @@ class JobStore:
         """Write a new job down, and lease it."""
         fields = {"owner": json.dumps(owner), "asked": json.dumps(asked), "view": json.dumps(view)}
         fields["replica"] = self.replica
-        async with self._reached():
+        with self._reached():
             await self._files.write(f"{BODY}:{job_id}", body, self._seconds)
             try:
                 async with self._redis.pipeline() as steps:
@@ -271,7 +254,7 @@ class JobStore:
     async def beat(self, job_id: str, view: dict[str, Any]) -> Lease:
         """Renew the lease of a job, and write how far it is."""
         arguments = [job_id, self.replica, _milliseconds(LEASE_SECONDS), json.dumps(view)]
-        async with self._reached():
+        with self._reached():
             return Lease((await self._beat(_keys(job_id), arguments)).decode())
 
     async def finish(
@@ -290,7 +273,7 @@ class JobStore:
                 size += len(piece)
                 yield piece
 
-        async with self._reached():
+        with self._reached():
             for name, pieces in results.items():
                 await self._files.write(f"{name}:{job_id}", counted(pieces), self._result_seconds)
             now = time.time()
@@ -308,12 +291,12 @@ class JobStore:
 
     async def release(self, job_id: str) -> None:
         """End the lease of a job that another replica is to do."""
-        async with self._reached():
+        with self._reached():
             await self._release(_keys(job_id), [job_id, self.replica])
 
     async def kept(self) -> dict[str, Kept]:
         """Return what is kept of the jobs of all replicas that have ended, the oldest first."""
-        async with self._reached():
+        with self._reached():
             async with self._redis.pipeline() as steps:
                 steps.hgetall(HELD)
                 steps.smembers(FETCHED)
@@ -333,14 +316,15 @@ class JobStore:
 
     async def fetched(self, job_id: str) -> None:
         """Note that somebody has the result of a job."""
-        async with self._reached(), self._redis.pipeline() as steps:
-            steps.sadd(FETCHED, job_id)
-            steps.pexpire(FETCHED, _milliseconds(self._result_seconds))
-            await steps.execute()
+        with self._reached():
+            async with self._redis.pipeline() as steps:
+                steps.sadd(FETCHED, job_id)
+                steps.pexpire(FETCHED, _milliseconds(self._result_seconds))
+                await steps.execute()
 
     async def find(self, job_id: str) -> Record | None:
         """Return the record of a job; None where there is none."""
-        async with self._reached():
+        with self._reached():
             fields = await self._redis.hgetall(_record(job_id))
         if b"view" not in fields or b"asked" not in fields:
             return None
@@ -355,17 +339,17 @@ class JobStore:
 
     async def file(self, name: str, job_id: str, into: MemoryFile) -> bool:
         """Append a file of a job to another; return whether it is still kept."""
-        async with self._reached():
+        with self._reached():
             return await self._files.read(f"{name}:{job_id}", into)
 
     async def cancel(self, job_id: str) -> None:
         """Tell the replica that works on a job to end it."""
-        async with self._reached():
+        with self._reached():
             await self._redis.hset(_record(job_id), "cancelled", "1")
 
     async def delete(self, job_id: str) -> None:
         """Forget a job."""
-        async with self._reached():
+        with self._reached():
             async with self._redis.pipeline() as steps:
                 steps.srem(OPEN, job_id)
                 steps.srem(FETCHED, job_id)
@@ -379,7 +363,7 @@ class JobStore:
 
         `has` says of an id whether this replica has the job: it takes none from itself.
         """
-        async with self._reached():
+        with self._reached():
             for name in await self._redis.smembers(OPEN):
                 job_id = name.decode()
                 if has(job_id) or await self._redis.exists(_lease(job_id)):
@@ -401,21 +385,14 @@ class JobStore:
                 await self.delete(job_id)
         return None
 
-
-class _Reached:
-    """Turns the errors of the store into StoreError and StoreFullError."""
-
-    def __init__(self, errors: tuple[type[Exception], ...], full: type[Exception]) -> None:
-        self._errors = errors
-        self._full = full
-
-    async def __aenter__(self) -> None:
-        return None
-
-    async def __aexit__(self, kind: object, error: BaseException | None, _: object) -> None:
-        if isinstance(error, self._full) or getattr(error, "errno", None) == ENOSPC:
-            raise StoreFullError("the store of jobs has no room", retry_after=60) from error
-        if isinstance(error, self._errors):
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        """Turn the errors of the store into StoreError and StoreFullError."""
+        try:
+            yield
+        except self._errors as error:
+            if isinstance(error, self._full) or getattr(error, "errno", None) == ENOSPC:
+                raise StoreFullError("the store of jobs has no room", retry_after=60) from error
             raise StoreError("the store of jobs does not answer", retry_after=5) from error
 
 

@@ -17,11 +17,11 @@ from ...workers.job import Job, State
 from ...workers.worker import JobFaultError
 from .. import problems
 from ..admission import DrainingError
+from ..answer import unless_gone
 from ..clients import client_of
-from ..intake import Wanted, owner_of, taken_in
-from ..leaving import unless_gone
+from ..intake import Wanted, taken_in
 from ..parameters import Parameters
-from ..result_room import result_folder
+from ..room import result_folder
 from ..service import Service
 from .book import Entry
 
@@ -79,7 +79,9 @@ async def hand_in(service: Service, request: Request, parameters: Parameters) ->
         await service.shared.check_room(client.networks)
     async with AsyncExitStack() as held:
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
-        entry = service.book.add(job, owner_of(client), client.networks)
+        # Of whoever has no key, everybody who knows a job's id may see it.
+        owner = client.id if client.named else None
+        entry = service.book.add(job, owner, client.networks)
         if service.shared is not None:
             try:
                 await service.shared.publish(job, entry.owner)

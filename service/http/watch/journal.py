@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ...request_ids import HEADER, REQUEST_ID, id_of
+from ...log_lines import HEADER, REQUEST_ID, id_of
 from ..clients import Client
 
 log = logging.getLogger("pns.request")
@@ -105,17 +105,10 @@ class Journal:
             REQUEST_ID.reset(token)
 
     def _write(self, entry: Entry) -> None:
-        fields = {
-            "method": entry.method,
-            "route": entry.route,
-            "status": entry.status,
-            "code": entry.code,
-            "client": entry.client,
-            "received": entry.received,
-            "sent": entry.sent,
-            "milliseconds": round(1000 * entry.seconds, 1),
-        }
-        log.info("request", extra={"fields": fields, "request_id": entry.id})
+        fields = asdict(entry)
+        name = fields.pop("id")
+        fields["milliseconds"] = round(1000 * fields.pop("seconds"), 1)
+        log.info("request", extra={"fields": fields, "request_id": name})
         for listener in self.listeners:
             listener(entry)
 

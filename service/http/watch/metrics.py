@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import os
 import platform
+import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 from prometheus_client import (
+    CONTENT_TYPE_LATEST,
     CollectorRegistry,
     Counter,
     Gauge,
@@ -18,15 +21,20 @@ from prometheus_client import (
     Info,
     PlatformCollector,
     ProcessCollector,
+    generate_latest,
 )
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+from starlette.responses import PlainTextResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...workers.catalogue import Catalogue
 from .journal import Entry
 
 # From a small mesh to the longest job.
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 600)
+# A text is made for a second, however often it is asked for.
+FRESH_SECONDS = 1.0
 
 
 class Metrics:
@@ -34,47 +42,23 @@ class Metrics:
 
     def __init__(self) -> None:
         own = self.registry = CollectorRegistry()
-        self._requests = Counter(
-            "pns_requests",
-            "Requests that have ended",
-            ["route", "method", "status", "code"],
-            registry=own,
+        counter, histogram = partial(Counter, registry=own), partial(Histogram, registry=own)
+        self._requests = counter(
+            "pns_requests", "Requests that have ended", ["route", "method", "status", "code"]
         )
-        self._request_seconds = Histogram(
-            "pns_request_seconds",
-            "Seconds from a request's head to the end of its answer",
-            ["route"],
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._received = Counter("pns_received_bytes", "Bytes of bodies", ["route"], registry=own)
-        self._sent = Counter("pns_sent_bytes", "Bytes of answers", ["route"], registry=own)
-        self._stage_seconds = Histogram(
-            "pns_stage_seconds",
-            "Seconds of a job by stage",
-            ["stage"],
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._queue_seconds = Histogram(
-            "pns_queue_seconds",
-            "Seconds that a job waited",
-            buckets=SECONDS,
-            registry=own,
-        )
-        self._faces = Counter(
-            "pns_faces", "Faces that came in and went out", ["direction"], registry=own
-        )
-        self._build = Info("pns_build", "What runs", registry=own)
-        self._build.info(
-            {"version": version("pns-subdivision"), "python": platform.python_version()}
-        )
-        self._model = Gauge(
-            "pns_model_info",
-            "The models that are served",
-            ["name", "hash", "default"],
-            registry=own,
-        )
+        text = "Seconds from a request's head to the end of its answer"
+        self._request_seconds = histogram("pns_request_seconds", text, ["route"], buckets=SECONDS)
+        self._received = counter("pns_received_bytes", "Bytes of bodies", ["route"])
+        self._sent = counter("pns_sent_bytes", "Bytes of answers", ["route"])
+        text = "Seconds of a job by stage"
+        self._stage_seconds = histogram("pns_stage_seconds", text, ["stage"], buckets=SECONDS)
+        text = "Seconds that a job waited"
+        self._queue_seconds = histogram("pns_queue_seconds", text, buckets=SECONDS)
+        self._faces = counter("pns_faces", "Faces that came in and went out", ["direction"])
+        runs = {"version": version("pns-subdivision"), "python": platform.python_version()}
+        Info("pns_build", "What runs", registry=own).info(runs)
+        labels = ["name", "hash", "default"]
+        self._model = Gauge("pns_model_info", "The models that are served", labels, registry=own)
         ProcessCollector(registry=own)
         PlatformCollector(registry=own)
         self.registry.register(_WorkerMemory())
@@ -150,3 +134,21 @@ def _resident(pid: int) -> int:
     except OSError:
         return 0
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+def scrapes(registry: CollectorRegistry, clock: Callable[[], float] = time.monotonic) -> ASGIApp:
+    """Return an application that answers GET /metrics with the state of a registry."""
+    text, made = b"", float("-inf")
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        nonlocal text, made
+        if scope["path"] != "/metrics" or scope["method"] not in ("GET", "HEAD"):
+            answer: Response = PlainTextResponse("GET /metrics", 404)
+        else:
+            # Nothing is awaited: of many scrapes at once the first makes the text.
+            if clock() - made >= FRESH_SECONDS:
+                text, made = generate_latest(registry), clock()
+            answer = Response(text, media_type=CONTENT_TYPE_LATEST)
+        await answer(scope, receive, send)
+
+    return app

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ...request_ids import HEADER
+from ...log_lines import HEADER
 from .journal import METHODS
 
 if TYPE_CHECKING:

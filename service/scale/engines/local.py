@@ -6,89 +6,62 @@ import multiprocessing
 import os
 import signal
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextvars import ContextVar
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from multiprocessing.connection import Connection, wait
+from typing import Generic
 
 from ...errors import WorkerDied
-from ...workers.ending import end_with_parent, no_interrupt
-from . import chunks
-from .chunks import Done
-from .work import Engine, R, T, Work
-
-if TYPE_CHECKING:
-    from pebble import ProcessPool
+from ...workers.worker import end_with_parent, no_interrupt
+from . import work as chunks
+from .work import Done, Engine, R, T, Work
 
 # Workers that may end in a row while they do no task: so many are not killed by chance.
 MOST_BROKEN = 100
-# A process ends itself past a task's time; this is for one that cannot, beyond a chunk's seconds.
-GRACE_SECONDS = 5.0
-# How often is looked after pools that may have ended.
-LOOK_SECONDS = 1.0
-NO_TASK = -1
-
-# In a worker: memory that its driver sees too, with the number of the task it is at.
-_current: ContextVar[Any] = ContextVar("current")
 
 
 def local(work: Work[T, R], workers: int) -> Engine[T, R]:
-    """Return an engine of `workers` processes on this machine.
-
-    Each process has a pool of its own, and one chunk at a time: in a pebble pool of several, one
-    that is killed between two tasks, or while it holds their common pipe, is the end of all.
-    """
-    from pebble import ProcessExpired
+    """Return an engine of `workers` processes on this machine, each with a chunk at a time."""
 
     def engine(tasks: Iterator[T]) -> Iterator[list[R]]:
-        idle = [_Worker.new(work.prepare) for _ in range(workers)]
-        busy: dict[Future[Done[R]], tuple[_Worker, list[T]]] = {}
+        crew = [_Worker(work) for _ in range(workers)]
         waiting: deque[T] = deque()
         again: deque[list[T]] = deque()
         results: list[R] = []
         size, broken = chunks.FIRST, 0
         try:
             while True:
-                while idle and (again or waiting):
-                    chunk = again.popleft() if again else _first(waiting, size)
-                    worker, future = idle.pop().sent(work, chunk)
-                    busy[future] = worker, chunk
+                for worker in crew:
+                    if not worker.chunk and (again or waiting):
+                        worker.take(again.popleft() if again else _first(waiting, size))
                 # The workers are busy: time to tell what came of the last chunk, and to look on.
                 if results:
                     yield results
                     results = []
                 waiting.extend(islice(tasks, max(0, workers * size - len(waiting))))
-                if idle and waiting:
+                busy = {worker.pipe: worker for worker in crew if worker.chunk}
+                if len(busy) < workers and waiting:
                     continue
                 if not busy:
                     return
-                for future in _ended({future: worker.pool for future, (worker, _) in busy.items()}):
-                    worker, chunk = busy.pop(future)
-                    idle.append(worker)
-                    lost: BaseException
-                    try:
-                        done = future.result()
-                    except (TimeoutError, ProcessExpired) as error:
-                        lost = error
-                    except BrokenProcessPool as error:
-                        # So it is called too where a process dies before its pool has read that it
-                        # has the chunk: which task it was at is known all the same.
-                        lost, idle[-1] = error, worker.replaced(work.prepare)
-                    else:
+                for pipe in wait(list(busy)):
+                    worker = busy[pipe]  # pyright: ignore[reportArgumentType]
+                    done = worker.hear()
+                    if done is not None:
                         results += done.results
-                        if left := chunk[len(done.results) :]:
+                        if left := worker.chunk[len(done.results) :]:
                             again.append(left)
-                        size, broken = done.next_size, 0
+                        worker.chunk, size, broken = [], done.next_size, 0
                         continue
-                    number = worker.current.value
-                    if number == NO_TASK:
+                    if worker.lives:
+                        continue
+                    crew[crew.index(worker)] = _Worker(work)
+                    chunk, number = worker.chunk, worker.current
+                    if number is None:
                         broken += 1
                         if broken == MOST_BROKEN:
                             text = f"{broken} workers ended one after the other outside any task"
-                            raise WorkerDied(text) from lost
+                            raise WorkerDied(text)
                         again.append(chunk)
                         continue
                     # Those before it were done, but nobody was told: they give the same again.
@@ -97,87 +70,78 @@ def local(work: Work[T, R], workers: int) -> Engine[T, R]:
                     if retry := work.again(chunk[number]):
                         again.append([retry])
                     else:
-                        results.append(work.given_up(chunk[number], late=_late(lost)))
+                        results.append(work.given_up(chunk[number], late=worker.was_late))
         finally:
-            pools = [worker.pool for worker in (*idle, *(worker for worker, _ in busy.values()))]
-            for pool in pools:
-                pool.stop()
-            for pool in pools:
-                pool.join()
+            for worker in crew:
+                worker.process.kill()
+            for worker in crew:
+                worker.process.join()
 
     return engine
 
 
-@dataclass(frozen=True)
-class _Worker:
-    """A process, in a pool of its own that starts it anew, and the task that it says it is at."""
+class _Worker(Generic[T, R]):
+    """A process, the chunk that it has, and the task of it that it says it is at."""
 
-    pool: ProcessPool
-    current: Any
-
-    @classmethod
-    def new(cls, prepare: Callable[[], None]) -> _Worker:
-        from pebble import ProcessPool
-
+    def __init__(self, work: Work[T, R]) -> None:
         context = multiprocessing.get_context("spawn")
-        current = context.RawValue("l", NO_TASK)
-        pool = ProcessPool(1, initializer=_begin, initargs=(current, prepare), context=context)
-        return cls(pool, current)
+        self.pipe, other = context.Pipe()
+        todo = work.prepare, work.job, work.seconds
+        self.process = context.Process(target=_serve, args=(other, *todo), daemon=True)
+        with no_interrupt():
+            self.process.start()
+        other.close()
+        self.chunk: list[T] = []
+        self.current: int | None = None
+        self.lives = True
 
-    def sent(self, work: Work[T, R], chunk: list[T]) -> tuple[_Worker, Future[Done[R]]]:
-        """Send a chunk; the worker is another where this one's process died while idle."""
-        self.current.value = NO_TASK
-        longest = None if work.seconds is None else work.seconds + chunks.SECONDS + GRACE_SECONDS
-        arguments = work.job, chunk, work.seconds
+    def take(self, chunk: list[T]) -> None:
+        """Begin a chunk; that the process has ended meanwhile is heard next."""
+        self.chunk = chunk
         try:
-            # The first call starts a process, and the thread that will start others in its place.
-            with no_interrupt():
-                return self, self.pool.schedule(_do, args=arguments, timeout=longest)
-        except RuntimeError:
-            return self.replaced(work.prepare).sent(work, chunk)
+            self.pipe.send(chunk)
+        except OSError:
+            return
 
-    def replaced(self, prepare: Callable[[], None]) -> _Worker:
-        """Return another one, in place of one whose pool has ended."""
-        self.pool.stop()
-        self.pool.join()
-        return _Worker.new(prepare)
+    def hear(self) -> Done[R] | None:
+        """Hear what the process says: results, which task it is at, a fault of ours; or its end.
+
+        Raises the fault.
+        """
+        try:
+            said = self.pipe.recv()
+        except (EOFError, OSError):
+            self.process.join()
+            self.pipe.close()
+            self.lives = False
+            return None
+        if isinstance(said, Exception):
+            raise said
+        if isinstance(said, Done):
+            return said
+        self.current = said
+        return None
+
+    @property
+    def was_late(self) -> bool:
+        """True where the process was ended because its task took too long."""
+        return self.process.exitcode == -signal.SIGALRM
 
 
-def _begin(current: Any, prepare: Callable[[], None]) -> None:
-    """Set up a process: one thread, since the files are the parallelism."""
+def _serve(
+    pipe: Connection, prepare: Callable[[], None], job: Callable[[T], R], seconds: float | None
+) -> None:
+    """Do chunks until nobody sends any; with one thread, since the files are the parallelism."""
     os.environ["OMP_NUM_THREADS"] = "1"
     end_with_parent()
-    _current.set(current)
     prepare()
-
-
-def _do(job: Callable[[T], R], tasks: list[T], seconds: float | None) -> Done[R]:
-    current = _current.get()
-
-    def begins(number: int | None) -> None:
-        current.value = NO_TASK if number is None else number
-
-    return chunks.do(job, tasks, seconds, begins)
-
-
-def _ended(pools: Mapping[Future[R], ProcessPool]) -> set[Future[R]]:
-    """Wait for calls to end, at least one; return those that have.
-
-    A pool whose process dies before it is ready may end without a word about what it was given.
-    """
-    silent: set[Future[R]] = set()
-    while not (ended := wait(pools, LOOK_SECONDS, FIRST_COMPLETED).done):
-        for future in silent:
-            future.set_exception(BrokenProcessPool("the pool has ended"))
-        # Not at once: what is told of an end is told soon after it.
-        silent = {future for future, pool in pools.items() if not pool.active}
-    return ended
+    while True:
+        tasks = pipe.recv()
+        try:
+            pipe.send(chunks.do(job, tasks, seconds, pipe.send))
+        except Exception as error:
+            pipe.send(error)
 
 
 def _first(waiting: deque[T], size: int) -> list[T]:
     return [waiting.popleft() for _ in range(min(size, len(waiting)))]
-
-
-def _late(lost: BaseException) -> bool:
-    """Return whether a process was ended because its task took too long."""
-    return isinstance(lost, TimeoutError) or getattr(lost, "exitcode", 0) == -signal.SIGALRM

@@ -11,9 +11,8 @@ from itertools import islice
 from typing import Any
 
 from ...errors import InvalidParameter
-from . import chunks
-from .chunks import Done
-from .work import Engine, R, T, Work
+from . import work as chunks
+from .work import Done, Engine, R, T, Work
 
 # Chunks in flight for each worker: one that runs, and one that keeps it from waiting.
 AHEAD = 2

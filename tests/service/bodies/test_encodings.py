@@ -6,7 +6,7 @@ import gzip
 
 import pytest
 
-from service.bodies.encodings import decoded, encoding_of
+from service.bodies.media import decoded, encoding_of
 from service.errors import LimitError, MediaTypeError, ServiceError, UnreadableError
 
 CONTENT = bytes(range(256)) * 40

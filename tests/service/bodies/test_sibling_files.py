@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from service.bodies.archive import MAX_ENTRIES, ArchiveError, open_archive
-from service.bodies.folder import folder_of
-from service.bodies.sibling_files import File, SiblingFiles, safe_name
+from service.bodies.sibling_files import File, SiblingFiles, folder_of, safe_name
 from service.errors import GltfError, LimitError, ServiceError, UnreadableError
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options

@@ -2,8 +2,8 @@
 
 import pytest
 
-from service.http.addresses import sites
-from service.http.pace import Pace
+from service.http.body_limits import Pace
+from service.http.clients import sites
 
 PACE = Pace(rate=100, grace=10, idle=4, whole=60)
 

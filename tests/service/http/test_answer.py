@@ -12,7 +12,7 @@ from starlette.types import Message, Scope
 from service.errors import BusyError
 from service.http.admission import Admission
 from service.http.answer import FileAnswer
-from service.http.head import Head
+from service.http.layers import Head
 from service.workers.memory_file import PIECE, MemoryFile
 
 PIECES = 12

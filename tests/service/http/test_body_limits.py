@@ -8,8 +8,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from service.errors import LimitError
-from service.http.body_limits import BodyLimit, UploadTimeoutError
-from service.http.pace import Pace
+from service.http.body_limits import BodyLimit, Pace, UploadTimeoutError
 
 # So many bytes a second, but for the first fifth of one.
 PACE = Pace(rate=1e6, grace=0.2, idle=60, whole=60)

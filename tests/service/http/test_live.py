@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -203,3 +204,22 @@ def test_a_client_that_does_not_read_is_cut_off(
             received += len(piece)
     assert received < 48 * MIB
     assert subdivide(client, b"here").content == b"here"
+
+
+def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(
+    address: tuple[str, int], client: httpx2.Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    large = f"large {48 * MIB}".encode().ljust(100)
+    for sent, answered in (
+        (b"GET /healthz HTT", 0),
+        (request_head(100) + b"half", 0),
+        (b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n", 1),
+        (request_head(len(large)) + large, 1),
+    ):
+        with socket.create_connection(address) as connection:
+            # Closed with what was not taken, so at once.
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            connection.sendall(sent)
+            assert len(connection.recv(answered)) == answered
+    assert subdivide(client, b"here").content == b"here"
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []

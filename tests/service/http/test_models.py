@@ -17,7 +17,7 @@ from fastapi.testclient import TestClient
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.http.admission import Admission
 from service.http.app import create_app
-from service.http.catalogue import ReadOnce
+from service.http.service import ReadOnce
 from service.meshfiles.example import part_glb
 from service.settings import Settings
 from service.workers.catalogue import Catalogue

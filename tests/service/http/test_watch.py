@@ -7,21 +7,18 @@ import socket
 import threading
 import urllib.request
 from collections import Counter
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, suppress
 
 import pytest
-import uvicorn
 from hypothesis import given
 from hypothesis import strategies as st
 from prometheus_client import CollectorRegistry, Gauge
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
-from service.http.prompt_server import PromptServer
-from service.http.watch.metrics import Metrics
-from service.http.watch.scrapes import scrapes
-from service.log_lines import LONGEST, JsonLines, TerminalLines
-from service.request_ids import REQUEST_ID
+from service.http.server import metrics_server
+from service.http.watch.metrics import Metrics, scrapes
+from service.log_lines import LONGEST, REQUEST_ID, JsonLines, TerminalLines
 from service.settings import Settings
 from service.workers.catalogue import Catalogue
 from tests.support import stand_in_jobs as jobs
@@ -203,14 +200,12 @@ def test_the_port_of_the_metrics_serves_nothing_else(method, path):
 @pytest.fixture
 def metrics_port():
     """The address of a server of metrics that waits half a second for a head."""
-    with closing(socket.create_server(("127.0.0.1", 0))) as listening:
-        config = uvicorn.Config(scrapes(CollectorRegistry()), lifespan="off", log_config=None)
-        server = PromptServer(config, head_seconds=0.5, most=16, listening=[listening])
-        thread = threading.Thread(target=server.run)
-        thread.start()
-        yield listening.getsockname()
-        server.should_exit = True
-        thread.join()
+    server = metrics_server(Metrics(), Settings(metrics_port=0, head_seconds=0.5))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    yield server.listening[0].getsockname()
+    server.should_exit = True
+    thread.join()
 
 
 def ends(connection):
@@ -219,6 +214,14 @@ def ends(connection):
         return connection.recv(1) == b""
     except ConnectionResetError:
         return True
+
+
+def test_metrics_listen_on_loopback_unless_they_are_to_listen_elsewhere(metrics_port):
+    assert metrics_port[0] == "127.0.0.1"
+    settings = Settings(metrics_port=0, metrics_host="0.0.0.0")
+    (elsewhere,) = metrics_server(Metrics(), settings).listening
+    with elsewhere:
+        assert elsewhere.getsockname()[0] == "0.0.0.0"
 
 
 def test_half_sent_heads_end_and_metrics_are_served_beside_them(metrics_port):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, loop
-from service.meshes.shape_creases import creases_by_shape
+from service.gltf.refine.mesh_refine import creases_by_shape
 from service.options import Options
 from train.data.primitives import box, cylinder
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.meshes.weld import weld
-from service.meshes.weld_tolerance import near_labels, weld_within
+from service.meshes.weld import near_labels, weld, weld_within
 from tests.support.gltf.shapes import octahedron
 
 

@@ -45,10 +45,10 @@ def stl_text() -> str:
     return "solid part\n" + "".join(facets)
 
 
-def stl_binary(head: bytes = b"", count: int = 12) -> bytes:
-    corners = np.array(CORNERS, dtype="<f4")[np.array(TRIANGLES)]
+def stl_binary(head: bytes = b"", count: int = 12, order: str = "<") -> bytes:
+    corners = np.array(CORNERS, dtype=f"{order}f4")[np.array(TRIANGLES)]
     facets = b"".join(bytes(12) + three.tobytes() + bytes(2) for three in corners)
-    return head.ljust(80, b"\0") + struct.pack("<I", count) + facets
+    return head.ljust(80, b"\0") + struct.pack(f"{order}I", count) + facets
 
 
 def strips() -> bytes:
@@ -70,9 +70,19 @@ CUBES: dict[str, tuple[str, bytes]] = {
     "obj: a statement nobody knows": ("obj", (OBJ + "shadow_obj a\n\n" + OBJ_FACES).encode()),
     "obj: in UTF-16": ("obj", (OBJ + OBJ_FACES).encode("utf-16")),
     "obj: lines ended by returns": ("obj", (OBJ + OBJ_FACES).replace("\n", "\r").encode()),
+    "obj: no numbers, in Microsoft's words": (
+        "obj",
+        (OBJ + "vn -1.#IND 1.#QNAN -nan(ind)\n" + OBJ_FACES).encode(),
+    ),
     "obj: behind a mark": ("obj", b"\xef\xbb\xbf" + (OBJ + OBJ_FACES).encode()),
     "off: counts glued to the header": ("off", ("OFF8 6 0\n" + OFF_BODY).encode()),
     "off: blanks before the header": ("off", ("\t  OFF8 6 12 # comment\n" + OFF_BODY).encode()),
+    "off: small letters": ("off", ("off\n8 6 0\n" + OFF_BODY).encode()),
+    "off: normals before colours": (
+        "off",
+        ("NCOFF\n8 6 0\n" + OFF_BODY.replace("\n", " 0 0 1 255 0 0 255\n", 8)).encode(),
+    ),
+    "off: words behind": ("off", ("OFF\n8 6 0\n" + OFF_BODY + "made by X\n").encode()),
     "off: counts on lines": ("off", ("OFF\n8\n6\n0\n" + OFF_BODY).encode()),
     "off: no count of edges": ("off", ("OFF\n8 6\n" + OFF_BODY).encode()),
     "off: no header": ("off", ("# a\n8 6 12\n" + OFF_BODY).encode()),
@@ -98,6 +108,13 @@ CUBES: dict[str, tuple[str, bytes]] = {
         "ply",
         ply().replace(b"element face", b"Made by X\nelement face"),
     ),
+    "ply: no numbers, in Microsoft's words": (
+        "ply",
+        ply(
+            "property float quality\nproperty float other\n",
+            points=PLY_POINTS.replace("\n", " -1.#IND -nan(ind)\n"),
+        ),
+    ),
     "ply: a comment among the numbers": ("ply", ply().replace(b"3 0 3 2", b"comment b\n3 0 3 2")),
     "ply: lines ended by returns": ("ply", ply().replace(b"\n", b"\r")),
     "ply: strips": ("ply", strips()),
@@ -105,6 +122,11 @@ CUBES: dict[str, tuple[str, bytes]] = {
     "stl: another end": ("stl", (stl_text() + "end solid part\n").encode()),
     "stl: on one line": ("stl", stl_text().replace("\n", " ").encode()),
     "stl: in capitals": ("stl", stl_text().upper().encode()),
+    "stl: a name of its own words": (
+        "stl",
+        (stl_text().replace("part", "vertex endloop") + "endsolid vertex endloop\n").encode(),
+    ),
+    "stl: of a big-endian machine": ("stl", stl_binary(order=">")),
     "stl: bytes behind": ("stl", stl_binary() + b"tail"),
     "stl: a header like a text": ("stl", stl_binary(b"solid part") + b"\r\n"),
     "stl: a count of 0": ("stl", stl_binary(count=0)),
@@ -267,12 +289,50 @@ def test_vertex_colours_are_kept_and_blended_linearly(kind: str, target: str) ->
     np.testing.assert_allclose(found, sorted(ends + middles), atol=0.01)
 
 
+def test_colours_up_to_255_are_fractions_of_it() -> None:
+    float_ply = (
+        COLOURED["ply"].replace("uchar red", "float red").replace("uchar green", "float green")
+    )
+    paint = "#MRGB ffff0040ff00ff40ff000040\n"
+    plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    given = {
+        "obj": [
+            COLOURED["obj"].replace(" 1 0 .25", " 255 0 64").replace(" 0 1 .25", " 0 255 64"),
+            plain + paint + "f 1 2 3\n",
+        ],
+        "ply": [float_ply.replace("uchar blue", "float blue")],
+        "off": [COLOURED["off"]],
+    }
+    given["obj"][0] = given["obj"][0].replace(" 0 0 .25", " 0 0 64")
+    for kind, texts in given.items():
+        for text in texts:
+            colours = formats.read(text.encode(), kind).layers[COLOUR].values
+            assert colours.dtype == np.uint8
+            assert colours[:, :3].tolist() == [[255, 0, 64], [0, 255, 64], [0, 0, 64]]
+    part = formats.read((plain + paint[:-9] + "\nf 1 2 3\n").encode(), "obj")
+    assert [change.what for change in part.changes] == [
+        "colours that not all vertices have dropped"
+    ]
+
+
 def test_colours_of_faces_stay_with_the_faces_made_of_them() -> None:
     text = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n"
     for target in ("off", "ply"):
         mesh = formats.read(refined(text.encode(), "off", target).content, target)
         colours = mesh.face_values[COLOUR][:, :3]
         assert colours.tolist() == 4 * [[255, 0, 0]] + 4 * [[0, 0, 255]]
+
+
+def test_colours_of_faces_below_those_of_vertices_are_reported() -> None:
+    colour = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    points, faces = PLY_POINTS.replace("\n", " 255 0 0 .5\n"), PLY_FACES.replace("\n", " 0 0 255\n")
+    head = PLY_HEAD.format(f"{colour}property float alpha\n", colour)
+    made = refined((head + points + faces).encode(), "ply", "glb")
+    tree, binary = files.unpack(made.content)
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    assert (files.values_of(tree, binary, attributes["COLOR_0"])[:, :3] == [255, 0, 0]).all()
+    assert "_ALPHA" in attributes
+    assert any("colours of faces" in change["what"] for change in made.report["changes"])
 
 
 def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:

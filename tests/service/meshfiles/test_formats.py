@@ -312,6 +312,10 @@ TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
     [
         ("stl", bytes(80) + b"\xff\xff\xff\xff"),
         ("stl", b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n"),
+        (
+            "stl",
+            b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nfacet normal 0 0\n",
+        ),
         ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n"),
         ("off", b"OFF\n3 1 0\n" + TRIANGLE + b"3 0 1 99999999999999999999999\n"),
         ("off", b"OFF\n3 " + b"9" * 25 + b" 0\n" + TRIANGLE + b"3 0 1 2\n"),

@@ -70,6 +70,20 @@ def test_each_material_is_a_primitive_with_what_its_library_says() -> None:
     assert told == {"embedded": 1}
 
 
+def test_names_may_be_quoted_and_comments_may_stand_behind_them() -> None:
+    mtl = MTL.replace(b"tex\\wall 1.png", b'"tex\\wall 1.png" # of bricks')
+    mtl = mtl.replace(b"newmtl glass", b"newmtl glass # thin")
+    siblings = beside(**{"my scene.mtl": mtl})
+    for obj in (OBJ, OBJ.replace(b"my scene.mtl", b'"my scene.mtl"')):
+        made = converted(
+            obj, "obj", "glb", Options(scheme="loop"), None, Limits(), siblings=siblings
+        )
+        tree = files.unpack(made.content)[0]
+        assert [material["name"] for material in tree["materials"]] == ["glass", "brick wall"]
+        assert tree["materials"][0]["alphaMode"] == "BLEND"
+        assert len(tree["images"]) == 1
+
+
 def test_a_library_that_did_not_come_is_reported_and_names_stay() -> None:
     tree, told = tree_of(ALONE)
     assert [material["name"] for material in tree["materials"]] == ["glass", "brick wall"]

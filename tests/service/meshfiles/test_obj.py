@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from service.errors import UnreadableError
+from service.errors import UnreadableError, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.counted import count_triangles
-from service.meshfiles.mesh_file import UV
+from service.meshfiles.mesh_file import MATERIAL, UV
+from service.meshfiles.parts import chosen_of
+from service.options import Options
 
 POSITIONS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 1\nv 3 3 3\n"
 CORNERS = [[float(word) for word in line.split()[1:]] for line in POSITIONS.splitlines()]
@@ -92,6 +94,7 @@ def test_texture_coordinates_count_back_from_their_own_face_too():
         (POSITIONS + "f 1 1_0 2\n", "line 7 .* '1_0' is no number"),
         (POSITIONS + "vt 0 0\nf 1/1 2/1_0 3/1\n", "line 8 .* '2/1_0' is no corner of a face"),
         (POSITIONS.replace("2 2 1", "2_2 2 1") + "f 1 2 5\n", "line 5 .* is no number"),
+        (POSITIONS + "f 1.0 2 3\n", "line 7 .* '1.0' is no number"),
         ((POSITIONS + "f 1 2 7\n").replace("\n", "\r"), "line 7 .* vertex 7, and there are 6"),
         (POSITIONS + "f 1 2\nf 2 3\n", "the OBJ file has no faces"),
     ],
@@ -99,6 +102,34 @@ def test_texture_coordinates_count_back_from_their_own_face_too():
 def test_what_is_wrong_is_named_with_its_line(text, words):
     with pytest.raises(UnreadableError, match=words):
         formats.read(text.encode(), "obj")
+
+
+def test_a_name_may_have_a_sign_that_begins_a_comment_elsewhere():
+    names = ["Wood#1", "Material #2", "red # a comment", "#4", "two words"]
+    text = POSITIONS + "".join(f"usemtl {name}\nf 1 2 3\n" for name in names)
+    labels = formats.read(text.encode(), "obj").labels[MATERIAL]
+    assert labels.names == ("Wood#1", "Material #2", "red", "#4", "two words")
+    assert labels.of_face.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_face_of_several_groups_is_chosen_by_each():
+    text = POSITIONS + "g left arm\nf 1 2 3\ng right arm\nf 1 3 4\ng legs\nf 1 4 5\n"
+    mesh = formats.read(text.encode(), "obj")
+    chosen = {"arm": [1, 1, 0], "left arm": [1, 0, 0], "legs": [0, 0, 1]}
+    for name, faces in chosen.items():
+        assert (chosen_of(mesh, Options(group=name)) == faces).all()
+    with pytest.raises(UnrefinableError, match="legs, right arm"):
+        chosen_of(mesh, Options(group="leg"))
+
+
+def test_corners_that_name_what_is_not_there_are_reported():
+    text = POSITIONS + "vt 0 0\nf 1/1 2/1 3/2\nf 1//4 2//-9 3\n"
+    told = {change.what: change.count for change in formats.read(text.encode(), "obj").changes}
+    del told["vertices dropped that no face uses"]
+    assert told == {
+        "references to missing texture coordinates dropped": 1,
+        "references to missing vertex normals dropped": 2,
+    }
 
 
 def test_an_off_may_begin_with_a_mark_of_its_encoding():

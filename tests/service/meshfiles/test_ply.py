@@ -101,7 +101,10 @@ def test_a_file_that_was_cut_off_says_where(order: str) -> None:
         (ply("<").replace(b"uint vertex", b"quad vertex"), "line 9 of the PLY header"),
         (ply("<")[:100], "its header has no end"),
         (ply("").replace(b"4 0 1 2 3", b"4 0 1,5 2 3"), r"line 16 of the PLY file: '1,5'"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "a whole number"),
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "vertex_indices .* 1.5, no whole number"),
+        (ply("").replace(b"4 0 1 2 3", b"4.5 0 1 2 3"), "ends after"),
+        # No comment, which would hide the numbers behind it.
+        (ply("").replace(b"4 0 1 2 3", b"4 0 1 #2 3"), r"line 16 of the PLY file: '#2'"),
         (ply("").replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
         (b"OFF\n", "this is not a PLY"),
     ],
@@ -138,3 +141,16 @@ def test_normals_colours_and_double_positions_come_back_in_their_types() -> None
 
 def test_triangles_are_counted_by_the_header() -> None:
     assert count_triangles(ply("<"), "ply") == count_triangles(ply(""), "ply") == len(FANS)
+
+
+def test_faces_of_more_corners_than_a_byte_counts_are_written_whole() -> None:
+    for sizes in ([300], [3, 300, 4]):
+        offsets = np.append(0, np.cumsum(sizes))
+        corners = np.concatenate([np.arange(size) for size in sizes])
+        points = np.random.default_rng(0).random((300, 3))
+        values = {"_weight": np.arange(len(sizes), dtype=np.int32)[:, None]}
+        mesh = MeshFile(points, offsets, corners, face_values=values)
+        again = read_ply(write(mesh, "ply"))
+        assert again.corners.tolist() == corners.tolist()
+        assert again.sizes.tolist() == sizes
+        assert again.face_values["weight"].tolist() == [[face] for face in range(len(sizes))]

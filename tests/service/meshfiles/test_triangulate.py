@@ -93,6 +93,17 @@ def test_triangles_stay_in_the_order_of_their_polygons() -> None:
     assert len(mesh.faces) == 1 + 6 + 1
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize("shift", range(9))
+def test_a_side_that_turns_back_to_where_it_came_from_has_no_area(turn: int, shift: int) -> None:
+    points = [(0, 0), (4, 0), (4, 4), (2, 4), (2, 6), (2, 8), (2, 6), (2, 4), (0, 4)]
+    mesh = cut(points, np.roll(range(9), shift)[::turn].tolist())
+    assert np.abs(areas(mesh)).sum() == pytest.approx(16, rel=1e-9)
+    assert {(2, 4)} <= {tuple(point) for point in mesh.vertices[mesh.corners][:, :2].tolist()}
+    beyond = cut([*points[:6], (2, 5), (0, 4)], [*range(8)])
+    assert any("cross themselves" in change.what for change in beyond.changes)
+
+
 def test_a_polygon_that_crosses_itself_is_reported() -> None:
     mesh = cut([(0, 0), (1, 1), (1, 0), (0, 1)], [0, 1, 2, 3])
     assert len(mesh.faces) == 2

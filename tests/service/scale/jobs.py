@@ -56,6 +56,11 @@ def hears_interrupts(task: Numbered) -> bool:
     return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
+def divides_by_zero(task: Numbered) -> float:
+    """A fault of ours."""
+    return 1 / (task.attempt - task.attempt)
+
+
 def ends_at_once() -> None:
     """A worker that cannot begin."""
     os._exit(1)

@@ -3,18 +3,17 @@
 import os
 import signal
 import sys
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
 import pytest
-from pebble.pool.process import TaskManager
 
 from service.errors import InvalidParameter, WorkerDied
-from service.scale.engines import chunks, local, on_ray
+from service.scale.engines import local, on_ray
+from service.scale.engines import work as chunks
 from service.scale.engines.work import Work
 from tests.service.scale.jobs import (
     Numbered,
+    divides_by_zero,
     ends_at_once,
     hears_interrupts,
     process_of,
@@ -33,18 +32,18 @@ def never(task, error):
 def test_a_worker_that_is_killed_between_two_tasks_costs_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "MOST", 1)
     processes, killed = [], []
-    sent = local._Worker.sent
+    take = local._Worker.take
 
-    def killed_before(worker, work, chunk):
+    def killed_before(worker, chunk):
         """The one worker has nothing to do before each chunk: time to kill it."""
         if chunk[0].number == len(killed) + 1:
             killed.append(all_tasks[len(killed)].processes[-1])
             os.kill(killed[-1], signal.SIGKILL)
-        return sent(worker, work, chunk)
+        take(worker, chunk)
 
-    monkeypatch.setattr(local._Worker, "sent", killed_before)
+    monkeypatch.setattr(local._Worker, "take", killed_before)
     all_tasks = tasks(tmp_path, 4)
-    work = Work(process_of, never, 1, None)
+    work = Work(process_of, never, None)
     for results in local.local(work, 1)(iter(all_tasks)):
         processes += results
     assert processes[:3] == killed
@@ -53,56 +52,30 @@ def test_a_worker_that_is_killed_between_two_tasks_costs_nothing(tmp_path, monke
 
 def test_workers_that_never_begin_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(local, "MOST_BROKEN", 2)
-    work = Work(process_of, never, 1, None, ends_at_once)
+    work = Work(process_of, never, None, ends_at_once)
     with pytest.raises(WorkerDied, match="2 workers ended"):
         list(local.local(work, 1)(iter(tasks(tmp_path, 1))))
 
 
-def test_a_pool_that_ends_without_a_word_is_noticed(monkeypatch):
-    """Of a call that it never took it says nothing, and whoever waits for that waits for ever."""
-    monkeypatch.setattr(local, "LOOK_SECONDS", 0.001)
-    alive, ended = (SimpleNamespace(active=active) for active in (True, False))
-    waiting, lost = Future(), Future()
-    assert local._ended({waiting: alive, lost: ended}) == {lost}
-    assert isinstance(lost.exception(), BrokenProcessPool)
-    assert not waiting.done()
-
-
 def test_ctrl_c_is_the_driver_s_alone(tmp_path):
     """A terminal sends it to all; workers, also those that are starting, leave it alone."""
-    work = Work(hears_interrupts, never, 2, None)
+    work = Work(hears_interrupts, never, None)
     assert list(local.local(work, 1)(iter(tasks(tmp_path, 1)))) == [[False]]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
-def blamed_of_a_chunk(tmp_path, monkeypatch):
-    """Run a chunk of which task 3 kills its worker; return its tasks."""
+def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "FIRST", 6)
     all_tasks = tasks(tmp_path, 6)
-    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), 2, None)
+    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), None)
     done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
     assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
-    assert len(all_tasks[3].processes) == 2
-    return all_tasks
+    assert [len(task.processes) for task in all_tasks[3:]] == [2, 1, 1]
 
 
-def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
-    all_tasks = blamed_of_a_chunk(tmp_path, monkeypatch)
-    assert [len(task.processes) for task in all_tasks[4:]] == [1, 1]
-
-
-def test_a_worker_that_dies_before_its_pool_knows_what_it_has_is_to_blame_too(
-    tmp_path, monkeypatch
-):
-    """On a busy machine the pool sees the end of a process before it reads what that began."""
-    begins = TaskManager.task_start
-
-    def unread(manager, task, process):
-        if process is None:
-            begins(manager, task, process)
-
-    monkeypatch.setattr(TaskManager, "task_start", unread)
-    blamed_of_a_chunk(tmp_path, monkeypatch)
+def test_a_fault_of_a_task_is_raised_as_it_was(tmp_path):
+    with pytest.raises(ZeroDivisionError):
+        list(local.local(Work(divides_by_zero, never, None), 1)(iter(tasks(tmp_path, 1))))
 
 
 class TaskError(RuntimeError):
@@ -148,7 +121,7 @@ def test_of_a_chunk_that_a_cluster_loses_each_task_goes_alone(tmp_path, monkeypa
 
     monkeypatch.setitem(sys.modules, "ray", Cluster())
     monkeypatch.setattr(chunks, "FIRST", 6)
-    work = Work(third_is_lost, lambda task, _: (task.number, -task.attempt), 2, None)
+    work = Work(third_is_lost, lambda task, _: (task.number, -task.attempt), None)
     engine = on_ray.on_ray(work, None, 1)
     done = [result for results in engine(iter(tasks(tmp_path, 6))) for result in results]
     assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
@@ -159,7 +132,7 @@ def test_a_fault_of_a_task_on_a_cluster_is_raised_as_it_was(tmp_path, monkeypatc
         raise Cluster.exceptions.RayTaskError
 
     monkeypatch.setitem(sys.modules, "ray", Cluster())
-    engine = on_ray.on_ray(Work(breaks, never, 2, None), None, 1)
+    engine = on_ray.on_ray(Work(breaks, never, None), None, 1)
     with pytest.raises(ZeroDivisionError, match="ours"):
         list(engine(iter(tasks(tmp_path, 1))))
 
@@ -167,7 +140,7 @@ def test_a_fault_of_a_task_on_a_cluster_is_raised_as_it_was(tmp_path, monkeypatc
 def test_without_ray_its_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(InvalidParameter, match=r"pns-subdivision\[ray\]"):
-        on_ray.on_ray(Work(str, never, 2, None), None, 1)
+        on_ray.on_ray(Work(str, never, None), None, 1)
 
 
 def test_small_tasks_fill_a_chunk_and_long_ones_go_alone():

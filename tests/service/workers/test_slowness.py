@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service.workers.slowness import MOST, TELLING_SECONDS, Slowness
+from service.workers.costs import MOST, TELLING_SECONDS, Slowness
 
 
 @pytest.mark.parametrize("factor", [0.25, 1.0, 3.0])

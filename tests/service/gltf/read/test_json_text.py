@@ -5,8 +5,8 @@ import tracemalloc
 import pytest
 
 from service.errors import GltfError, LimitError, UnreadableError
-from service.gltf.read import json_text
-from service.gltf.read.json_text import decode_object, encode
+from service.gltf.read import container
+from service.gltf.read.container import decode_object, encode
 from service.options import BYTES_PER_INPUT_BYTE, Limits
 
 LIMITS = Limits()
@@ -69,7 +69,7 @@ def test_brackets_in_strings_do_not_nest():
 
 def test_depth_and_strings_go_on_from_block_to_block():
     depth = LIMITS.max_json_depth - 2
-    pairs = b"[]," * (json_text._BLOCK // 2)
+    pairs = b"[]," * (container._BLOCK // 2)
     text = b'{"a":[%s"' + pairs + b"[" * 1000 + b'"]}'
     assert decode_object(text.replace(b"%s", pairs), LIMITS)
     assert decode_object(text.replace(b"%s", pairs + nested(depth) + b","), LIMITS)

@@ -19,6 +19,8 @@ LOOP = Options(scheme="loop")
 
 def refuse_what_it_takes(data, media, options):
     """Refine a file without limits, then within the memory that it took: the prediction is more."""
+    # Kernels are loaded with the first that needs them.
+    subdivide_gltf(data, media, options, None, Limits())
     tracemalloc.start()
     try:
         subdivide_gltf(data, media, options, None, Limits())

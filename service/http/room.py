@@ -1,8 +1,15 @@
-"""Fit connections under the limit on open files, so that accepting never fails."""
+"""Fit settings to this machine: connections to its open files, results to their disk.
+
+So accepting never fails, and keeping old results never fails new ones.
+"""
 
 from __future__ import annotations
 
 import logging
+import os
+import shutil
+from pathlib import Path
+from tempfile import gettempdir
 
 from ..settings import Settings, StartError
 
@@ -18,9 +25,12 @@ OF_REQUEST = 5
 OF_RESULT = 2
 # Connections beyond those, until the idle ones have ended.
 BEYOND = 128
+# Of what is free at the start: results that are made, and those that are struck out while somebody
+# takes them, lie there beside those that are kept.
+KEPT_SHARE = 0.75
 
 
-def fitting(settings: Settings) -> int:
+def connections_that_fit(settings: Settings) -> int:
     """Return `settings.connections`, or what descriptors are there for; raises the limit first.
 
     Raises:
@@ -55,3 +65,38 @@ def fitting(settings: Settings) -> int:
         settings.connections,
     )
     return fit
+
+
+def result_folder(settings: Settings) -> Path:
+    """Return where results are kept."""
+    return settings.result_folder or Path(gettempdir())
+
+
+def with_results_that_fit(settings: Settings) -> Settings:
+    """Return the settings, with as many bytes of results as there is room for.
+
+    With more the disk would be full before the oldest result had to go, and every job would fail
+    until its time is over. Where nothing can be said of a disk, its jobs will say it. Raises
+    StartError where there is no such folder, or none that may be written to.
+    """
+    try:
+        folder = result_folder(settings)
+    except OSError as error:
+        raise StartError(f"results can be kept nowhere: {error.strerror}") from error
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise StartError(f"results: {folder} is no folder that may be written to")
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return settings
+    fit = max(1, int(free * KEPT_SHARE))
+    if fit >= settings.result_bytes:
+        return settings
+    log.warning(
+        "%d bytes are free in %s: results may take %d, in place of the %d of PNS_RESULT_BYTES",
+        free,
+        folder,
+        fit,
+        settings.result_bytes,
+    )
+    return settings.model_copy(update={"result_bytes": type(settings.result_bytes)(fit)})
