@@ -164,10 +164,12 @@ def create_app(
         "Results that are kept; with a store those of all replicas",
         lambda: (service.shared or book).bytes,
     )
-    app.include_router(routes.router(service))
-    app.include_router(job_routes.router(service))
+    routers = [routes.router(service), job_routes.router(service), pages.router(settings.prefix)]
+    for router in routers:
+        app.include_router(router)
+    # For the journal: what a layer refuses reaches none of them.
+    app.state.routes = [route for router in routers for route in router.routes]
     app.openapi = openapi.described(app.openapi)  # type: ignore[method-assign]
-    app.include_router(pages.router(settings.prefix))
     return app
 
 

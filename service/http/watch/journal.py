@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...log_lines import HEADER, REQUEST_ID, id_of
@@ -117,8 +118,8 @@ def _route(scope: Scope) -> str:
     """Return the pattern of the route that was asked, also where a layer refused the request."""
     route = scope.get("route")
     if route is None and "app" in scope:
-        matches = (route.matches(scope) for route in scope["app"].routes)
-        route = next((child["route"] for match, child in matches if "route" in child), None)
+        routes = getattr(scope["app"].state, "routes", ())
+        route = next((one for one in routes if one.matches(scope)[0] is not Match.NONE), None)
     return getattr(route, "path", None) or "none"
 
 
