@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from pns_common.kernels import ANNOUNCEMENT, are_compiled
+from pns_common.kernels import are_compiled
 from pns_common.mesh import Mesh
 from pns_common.model.file import load_model
+from pns_common.progress import compiling
 from pns_common.refinement import refine
 from pns_common.schemes import catmull_clark, loop, pns
 
@@ -26,16 +27,15 @@ def warm_up(
     """Run every kernel once on small meshes, so that later calls find it compiled.
 
     Args:
-        announce: called with a sentence if the kernels must be compiled first, which takes seconds;
-            loading them takes half a second.
+        announce: called with a sentence if kernels must be compiled first, which takes seconds, and
+            now and then meanwhile; loading them takes half a second.
         progress: called with (stages done, stages in all).
     """
-    if not are_compiled():
-        announce(ANNOUNCEMENT)
     stages = list(_stages())
-    for done, run in enumerate(stages, start=1):
-        run()
-        progress(done, len(stages))
+    with compiling(announce):
+        for done, run in enumerate(stages, start=1):
+            run()
+            progress(done, len(stages))
 
 
 def _stages() -> Iterator[Callable[[], object]]:

@@ -17,16 +17,20 @@ from pns_common.report import LevelReport
 BENT = math.radians(0.5)
 # From this share of bent edges that stay sharp on, a shape looks faceted.
 MANY_SHARP = 0.25
+# Degrees, offered for a rounder shape where it keeps at most this share of what stays sharp now.
+ANGLE = 40
+FEWER = 0.75
 # From this share of borders on, faces do not hang together.
 MOST_OPEN = 0.9
 
 
 @dataclass(frozen=True)
 class Bends:
-    """Number of bent edges of a control mesh, and of those that are kept sharp."""
+    """Number of bent edges of a control mesh, of those kept sharp, of those beyond ANGLE."""
 
     bent: int = 0
     sharp: int = 0
+    steep: int = 0
 
 
 NO_BENDS = Bends()
@@ -43,12 +47,14 @@ def count_bends(
     if creases.named is None:
         return [NO_BENDS] * parts
     topology = mesh.topology()
-    bent = np.flatnonzero(edge_cosines(mesh.vertices, topology) < math.cos(BENT))
+    cosines = edge_cosines(mesh.vertices, topology)
+    bent = np.flatnonzero(cosines < math.cos(BENT))
+    steep = cosines[bent] < math.cos(math.radians(ANGLE))
     sharp = creases.applied_by_name(topology).is_sharp[bent]
     part = np.zeros(len(bent), dtype=np.int64)
     if part_of_face is not None:
         part = part_of_face[topology.half_edges[bent, 0] // 3]
-    counts = (np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp))
+    counts = (np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp, steep))
     return [Bends(*each) for each in zip(*counts, strict=True)]
 
 
@@ -60,9 +66,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     creases = edges.get("crease", 0)
     total = creases + sum(edges[kind] for kind in ("interior", "boundary", "irregular"))
     if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
+        kept = f"{bends.sharp:,} of {bends.bent:,} bent edges are kept sharp: use"
+        middle = ""
+        if bends.steep <= FEWER * bends.sharp:
+            middle = f" crease=angle:{ANGLE}, which keeps {bends.steep:,}, for a rounder shape, or"
         return [
-            f"{bends.sharp:,} of {bends.bent:,} bent edges are kept sharp: "
-            "use crease=off for a rounder shape"
+            f"{kept}{middle} crease=off to round everything; pieces that only touch may come apart"
         ]
     if edges["boundary"] >= MOST_OPEN * total:
         return [

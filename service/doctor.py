@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 
 PACKAGES = ("numpy", "numba", "onnx", "onnxruntime")
@@ -72,14 +74,15 @@ def _settings() -> str:
 
 
 def _kernels() -> str:
-    from pns_common.kernels import are_compiled
+    from pns_common.progress import compiling
 
     from .warming import warm_up
 
-    began, kept = time.perf_counter(), are_compiled()
-    warm_up(lambda _: None)
+    began = time.perf_counter()
+    with compiling(partial(print, file=sys.stderr, flush=True)) as compiled:
+        warm_up(lambda _: None)
     seconds = f"ready after {time.perf_counter() - began:.1f} s"
-    return seconds if kept else f"{seconds}, compiled for the first time"
+    return f"{seconds}, {compiled.kernels} compiled" if compiled.kernels else seconds
 
 
 def _providers() -> str:

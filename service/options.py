@@ -83,7 +83,8 @@ class Options:
         if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease",
-                "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees",
+                "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees, "
+                "as in 'angle:40'",
             )
         if not 0 <= self.weld_tolerance <= MAX_WELD_TOLERANCE:
             raise InvalidParameter(
@@ -116,20 +117,22 @@ class Options:
 
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
-    "levels": f"depth, 1 to {MAX_LEVELS}: each level makes four faces of one",
-    "scheme": "the rules. auto: pns for triangles, catmull-clark for OBJ, PLY and OFF files with "
-    "polygons. pns and loop cut polygons; loop is without the learned correction",
+    "levels": f"how fine, 1 to {MAX_LEVELS}: each level makes four faces of one",
+    "scheme": "the rules. auto and pns: the learned ones; of polygons that the model has no rules "
+    "for auto makes quads by Catmull-Clark, and pns triangles. loop: the classic rules for "
+    "triangles; polygons are cut. catmull-clark: the classic rules for polygons",
     "budget": "C, dimensionless: how far the model may go from Loop. Default: the model's own",
     "reference_length": "R, the unit of length of the budget; auto measures each mesh",
     "diagnostics": "what a glTF carries of the report. full: also the vertex attributes "
     "_PNS_RATIO and _PNS_GATE of the last learned level",
     "uv": "smooth: Loop's stencil inside charts; their boundaries stay linear",
-    "normals": "auto: those of the file; where a mesh has none, new ones, smooth but across sharp "
-    "edges. keep: none where there are none. smooth: new ones for every mesh. limit: those of the "
-    "limit surface, with the option limit",
-    "crease": "edges to keep sharp. auto: each as sharp as the model's sharpness network finds "
-    "it, at as many levels as its card says; none without one. normals: edges whose two sides "
-    "carry different normals. angle: and degrees: edges whose faces meet at more. off: none",
+    "normals": "shading. auto: the file's normals; new ones, smooth but across sharp edges, where "
+    "a mesh of a glTF has none, and where most faces are shaded flat and crease is off. keep: the "
+    "file's, or none. smooth: new ones for every mesh. limit: those of the limit surface, with the "
+    "option limit",
+    "crease": "edges to keep sharp. auto: those that the model finds, and those that a glTF's "
+    "shading marks. angle: and degrees, as in angle:40: edges that bend by more. normals: edges "
+    "where the file's normals differ. off: none, everything becomes round",
     "weld": "which vertices are one. position: those in one place. index: those that the file "
     "gives one number, so that poses keep one numbering. off: corners alike in all they have",
     "weld_tolerance": f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than this times R",
@@ -143,7 +146,7 @@ DESCRIPTIONS = {
     "of a node that shows it",
     "compress": "how a glTF's geometry is written. meshopt: exact. draco: smaller; positions, "
     "normals and UVs are rounded",
-    "limit": "put the vertices on the limit surface",
+    "limit": "put each vertex where endless refinement would take it, on the limit surface",
 }
 
 

@@ -12,6 +12,33 @@ from pns_common.schemes import Scheme
 from .advice import Bends, advice_on
 from .errors import shortened, shortened_pointer
 
+# For changes that begin so: whether they are harmless, or what to do.
+HINTS = {
+    "border vertices lie within": "use weld_tolerance=0.001 if the result has gaps",
+    "bytes behind the": "harmless",
+    "corners with a normal that points away": "if they show as dark spots use normals=smooth",
+    "degenerate faces dropped": "harmless, they have no area",
+    "Draco compression decoded": "harmless, compress=draco packs the result again",
+    "embedded": "harmless, the result needs no file beside it",
+    "faces of fewer than three vertices": "harmless",
+    "faces too far from the origin": "move the mesh to the origin, or it will look toothed",
+    "found, and left": "harmless",
+    "joined into one": "harmless",
+    "meshopt compression decoded": "harmless, compress=meshopt packs the result again",
+    "nodes joined": "harmless",
+    "non-manifold edge": "harmless unless the faces come apart there",
+    "quantised attributes": "harmless",
+    "refined vertices that lost": "harmless unless they move wrongly",
+    "sparse accessors": "harmless",
+    "triangle": "harmless",
+    "vertices dropped": "harmless",
+}
+
+
+def hint_on(what: str) -> str:
+    """Return whether a change is harmless or what to do about it; empty where it says so itself."""
+    return next((hint for begins, hint in HINTS.items() if what.startswith(begins)), "")
+
 
 @dataclass(frozen=True)
 class Change:
@@ -41,6 +68,7 @@ class MeshResult:
         copies: faces of the control mesh that follow another with the same vertices.
         report: the operator's; None where no face was left, and the mesh stays as it was.
         bends: its bent edges, and the sharp ones among them.
+        name: what the file calls it; None without a name.
     """
 
     index: int
@@ -52,6 +80,7 @@ class MeshResult:
     copies: int
     report: Report | None
     bends: Bends
+    name: str | None = None
 
 
 def build_report(
@@ -83,10 +112,19 @@ def build_report(
             "zero_reference_lengths": sum(report["reference_length"] == 0 for report in refined),
         },
         "dropped": dropped(sum(result.degenerate for result in results), unused_vertices),
-        "changes": [asdict(change) for change in changes],
+        **changes_of(changes),
         "advice": advice_on(totals, bends),
         "levels": totals,
         "meshes": [_mesh(result) for result in results],
+    }
+
+
+def changes_of(changes: Sequence[Change]) -> dict[str, Any]:
+    """Return the report's entries on changes, and what to do about those that do not say it."""
+    hints = {change.what: hint_on(change.what) for change in changes}
+    return {
+        "changes": [asdict(change) for change in changes],
+        "hints": {what: hint for what, hint in hints.items() if hint},
     }
 
 
@@ -164,6 +202,7 @@ def _mesh(result: MeshResult) -> dict[str, Any]:
     report = result.report
     return {
         "index": result.index,
+        **({} if result.name is None else {"name": shortened(result.name)}),
         "instances": result.instances,
         "reference_length": 0.0 if report is None else report["reference_length"],
         "multi_fan_vertices": 0 if report is None else report["multi_fan_vertices"],

@@ -12,7 +12,8 @@ import math
 
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, following_corner, preceding_corner
-from pns_common.kernels.vectors import between, dot, norm, root
+from pns_common.kernels.frames import wing
+from pns_common.kernels.vectors import between, difference, dot, norm, root, row
 
 # Turns are counted by ramps between each pair of angles: about 15, 30, 50 and 66 degrees.
 RAMPS = tuple(
@@ -25,6 +26,9 @@ STEPS = len(RAMPS)
 SIZE, LENGTH, UP, DOWN, LARGEST, COLUMNS = STEPS, STEPS + 1, STEPS + 2, STEPS + 4, STEPS + 6, 13
 # Edges at a vertex that has more are continued by none, so that no hub costs its valence squared.
 MOST_SPOKES = 64
+# In a face of more corners an edge's wing edges are not the sides beside it, which around a cap are
+# as sharp as it is, but those of a triangle of the edge and the mean of the other corners.
+MOST_WINGED = 4
 # Sums of weights below this count as no edge.
 LEAST_WEIGHT = 0.05
 # Logarithms of ratios are cut off here, and counts of edges.
@@ -109,22 +113,31 @@ def measure_turns(turns, lengths, starts, spokes, begin, end, columns):
 
 
 @inlined
-def _write_side(e, h, side, sign, turns, lengths, areas, mesh, to):
+def _write_side(e, h, side, sign, points, turns, lengths, areas, mesh, to):
     """Write what is measured on one side of edge e, in the face of half-edge h, to a row."""
-    offsets, face_of_corner, corner_edges, edge_class = mesh
-    before = corner_edges[preceding_corner(h, offsets, face_of_corner)]
-    after = corner_edges[following_corner(h, offsets, face_of_corner)]
-    to[WINGS + 2 * side], to[WINGS + 2 * side + 1] = sign * turns[before], sign * turns[after]
-    to[OPEN] += ((edge_class[before] != INTERIOR) + (edge_class[after] != INTERIOR)) / 4
+    corners, offsets, face_of_corner, corner_edges, edge_class = mesh
+    beyond = following_corner(h, offsets, face_of_corner)
+    before, after = corner_edges[preceding_corner(h, offsets, face_of_corner)], corner_edges[beyond]
     f = face_of_corner[h] if len(face_of_corner) else h // 3
+    count = offsets[f + 1] - offsets[f]
+    if count > MOST_WINGED:
+        x, y, z, _ = wing(points, h, corners, offsets, face_of_corner)
+        back, ahead = 0.0, 0.0
+        first = norm(difference((x, y, z), row(points, corners[h])))
+        second = norm(difference((x, y, z), row(points, corners[beyond])))
+    else:
+        back, ahead = turns[before], turns[after]
+        first, second = lengths[before], lengths[after]
+        to[OPEN] += ((edge_class[before] != INTERIOR) + (edge_class[after] != INTERIOR)) / 4
     # Of a triangle its height over e, times the length of e.
-    height = areas[f] / (offsets[f + 1] - offsets[f] - 2)
-    both, square = lengths[before] + lengths[after], lengths[e] * lengths[e]
+    height = areas[f] / (count - 2)
+    both, square = first + second, lengths[e] * lengths[e]
+    to[WINGS + 2 * side], to[WINGS + 2 * side + 1] = sign * back, sign * ahead
     at = SIDES + side
-    to[at] = max(abs(turns[before]), abs(turns[after]))
+    to[at] = max(abs(back), abs(ahead))
     to[at + 2] = _share(height, square)
     to[at + 4] = _log(both, 2 * lengths[e])
-    to[at + 6] = abs(lengths[before] - lengths[after]) / both if both > 0 else 0.0
+    to[at + 6] = abs(first - second) / both if both > 0 else 0.0
 
 
 @inlined
@@ -216,14 +229,15 @@ def edge_features(
         mean_length: of all edges.
         features: (N, LOCAL or more) out.
     """
-    mesh = offsets, face_of_corner, corner_edges, edge_class
+    mesh = corners, offsets, face_of_corner, corner_edges, edge_class
     for i in range(rows.shape[0]):
         e, to = rows[i], features[i]
         sign = 1.0 if turns[e] >= 0 else -1.0
         to[OWN], to[JUMP], to[OPEN] = abs(turns[e]), jumps[e], 0.0
         to[SCALE] = _log(lengths[e], mean_length)
         for side in range(2):
-            _write_side(e, half_edges[e, side], side, sign, turns, lengths, areas, mesh, to)
+            h = half_edges[e, side]
+            _write_side(e, h, side, sign, points, turns, lengths, areas, mesh, to)
             v = edges[e, side]
             valence = starts[v + 1] - starts[v]
             _write_ring(e, v, side, sign, turns, lengths, columns, valence, to)

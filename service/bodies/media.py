@@ -1,4 +1,4 @@
-"""The kinds of files that are taken, their media types, and what a file is by its first bytes."""
+"""The kinds of files that are taken: media types, first bytes, and how bodies are encoded."""
 
 from __future__ import annotations
 

@@ -9,11 +9,21 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from ..options import DESCRIPTIONS, Options
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
+# Groups of `--help`, in their order. What is in none is for research.
+_EVERYDAY, _FILES, _MORE, _RESEARCH = "Everyday", "Files", "More", "Research"
+_PANELS = {
+    **dict.fromkeys(("output", "levels", "crease", "scheme", "limit", "normals"), _EVERYDAY),
+    **dict.fromkeys(("to", "read_as", "force", "compress", "report", "dry_run"), _FILES),
+    **dict.fromkeys(("uv", "weld", "weld_tolerance", "border", "polygons"), _MORE),
+    **dict.fromkeys(("material", "group", "engine", "address", "workers"), _MORE),
+}
+_ORDER = [*_PANELS]
 _METAVARS = {
     "budget": "C",
     "reference_length": "auto|X",
@@ -41,9 +51,21 @@ def takes_options(command: Command) -> Command:
         )
         for option in fields(Options)
     ]
-    kept = [*own.parameters.values()][:-1]
-    command.__signature__ = own.replace(parameters=[*kept, *made])  # type: ignore[attr-defined]
+    kept = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in own.parameters.values()][
+        :-1
+    ]
+    ordered = sorted([*kept, *made], key=_place)
+    command.__signature__ = own.replace(parameters=ordered)  # type: ignore[attr-defined]
     return command
+
+
+def _place(parameter: inspect.Parameter) -> int:
+    """Return an option's place in `--help`, and put it into its group; arguments come first."""
+    shown, *_ = getattr(parameter.annotation, "__metadata__", (None,))
+    if not isinstance(shown, OptionInfo):
+        return -1
+    shown.rich_help_panel = _PANELS.get(parameter.name, _RESEARCH)
+    return _ORDER.index(parameter.name) if parameter.name in _PANELS else len(_ORDER)
 
 
 def _described(name: str) -> Any:

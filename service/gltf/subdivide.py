@@ -124,6 +124,7 @@ def subdivide_gltf(
                         copies=mesh.copies,
                         report=mesh.report,
                         bends=mesh.bends,
+                        name=_name_of(upload.tree["meshes"][mesh.index]),
                     )
                     refined = (primitive.source.number for primitive in mesh.refined)
                     left_out = leave_out_ngons(upload.tree, mesh.index, refined)
@@ -141,6 +142,11 @@ def subdivide_gltf(
         glb = write_glb(encode(upload.tree), pieces, upload.container.others)
     faces_in = sum(plan.faces for plan in upload.plans)
     return Subdivided(glb, report, course.seconds, faces_in, parents)
+
+
+def _name_of(mesh: dict[str, Any]) -> str | None:
+    name = mesh.get("name")
+    return name if isinstance(name, str) and name else None
 
 
 def make_scheme(options: Options, model: Model | None) -> Scheme:

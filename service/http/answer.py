@@ -1,4 +1,4 @@
-"""The answer to a request whose bytes a worker left in a memory file."""
+"""Answers: the bytes that a worker left in a memory file, their type, and clients that leave."""
 
 from __future__ import annotations
 

@@ -97,8 +97,8 @@ def of_service_error(error: ServiceError) -> JSONResponse:
             members |= {"parameter": error.name, "choices": list(error.choices) or None}
         case BusyError():
             headers["Retry-After"] = str(error.retry_after)
-    if isinstance(error, UnauthorizedError):
-        headers["WWW-Authenticate"] = 'Bearer realm="pns"'
+        case UnauthorizedError():
+            headers["WWW-Authenticate"] = 'Bearer realm="pns"'
     return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
 
 

@@ -1,4 +1,4 @@
-"""The routes: a refined file, the models, and two probes for whoever runs the service."""
+"""The routes: a refined file, models, limits, and two probes for whoever runs the service."""
 
 from __future__ import annotations
 

@@ -129,17 +129,14 @@ class DrainingServer(PromptServer):
         most = connections_that_fit(settings)
         super().__init__(configuration(app, settings, most), settings.head_seconds, most)
         metrics: Metrics = app.state.metrics
-        metrics.gauge("pns_connections", "Open connections", self.count)
+        text, connections = "Open connections", self.server_state.connections
+        metrics.gauge("pns_connections", text, lambda: len(connections))
         self._admission: Admission = app.state.admission
         self._drain_seconds = settings.drain_seconds
         self._shared = settings.store is not None
         self._beside = beside
         self._began: float | None = None
         self._signals = 0
-
-    def count(self) -> int:
-        """Count the open connections."""
-        return len(self.server_state.connections)
 
     capture_signals = uvicorn.Server.capture_signals
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -18,8 +19,8 @@ import numpy as np
 from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
-from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.model.session import Model
+from pns_common.progress import compiling
 from pns_common.schemes import Scheme
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
@@ -29,8 +30,8 @@ from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
 from ..gltf.write.storage import Arrays, matrix_arrays
-from ..options import Limits, Options
-from ..report import Change
+from ..options import MAX_LEVELS, Limits, Options
+from ..report import Change, changes_of, hint_on
 from .flatten import flatten
 from .formats import FORMATS, held, read_within
 from .glb import as_glb, as_gltf_json
@@ -94,8 +95,6 @@ def convert(jobs: Jobs, options: Options, model: str | None, limits: Limits) -> 
     # Loop needs none, but one that is named and does not exist is a mistake to be told.
     loaded = load_model(model) if options.learns or model is not None else None
     console = Console(stderr=True, soft_wrap=True, highlight=False)
-    if not are_compiled():
-        console.print(ANNOUNCEMENT)
     for job in planned:
         try:
             _convert_one(job, jobs, options, loaded, limits, console)
@@ -121,7 +120,7 @@ def _convert_one(
         data, siblings = sys.stdin.buffer.read(), ALONE
     else:
         data, siblings = job.source.read_bytes(), folder_of(job.source)
-    with _progress(console) as course:
+    with _progress(console) as course, compiling(console.print) as compiled:
         written = converted(
             data,
             job.kind,
@@ -145,11 +144,16 @@ def _convert_one(
     if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(jobs.report, text + b"\n")
-    for line in (*lines_of(written.report), *advice_lines(written.report)):
+    for line in (*lines_of(written.report), *map(as_flags, written.report["advice"])):
         console.print(printable(line), markup=False)
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - began - compiled.seconds
     name = "stdout" if job.output == STREAM else job.output
-    console.print(f"{name}: {written.faces:,} faces in {seconds:.1f} s", markup=False)
+    made, triangles = f"{written.faces:,} faces", written.triangles
+    made += f", {triangles:,} triangles," if triangles != written.faces else ""
+    more = ""
+    if options.levels < MAX_LEVELS and not options.selects:
+        more = f"; --levels {options.levels + 1} would give {4 * triangles:,} triangles"
+    console.print(f"{name}: {made} in {seconds:.1f} s{more}", markup=False)
 
 
 def _planned(jobs: Jobs, options: Options) -> list[_Job]:
@@ -243,15 +247,21 @@ def converted(
         if target in GLTF_KINDS:
             glb, report = as_glb(refined, report, options, siblings, course)
             written = _of_gltf(glb, report, target, limits)
+            written = replace(written, triangles=_triangles_of(refined))
         else:
             kept, changes = held(refined, target)
             written = Written(
                 FORMATS[target].write(kept),
                 _with_changes(report, changes),
                 len(kept.sizes),
+                _triangles_of(kept),
                 parents=_map_of(kept, target),
             )
     return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
+
+
+def _triangles_of(mesh: MeshFile) -> int:
+    return len(mesh.corners) - 2 * len(mesh.sizes)
 
 
 def _map_of(mesh: MeshFile, target: str) -> Arrays:
@@ -287,7 +297,10 @@ def predicted_faces(
 
 
 def lines_of(report: dict[str, Any]) -> Iterator[str]:
-    """Yield what was changed or lost, each thing once: how often, and where first."""
+    """Yield what was changed or lost, each thing once: how often, what to do, and where first."""
+    names = {
+        f"/meshes/{mesh['index']}": mesh["name"] for mesh in report["meshes"] if "name" in mesh
+    }
     said: Counter[str] = Counter()
     places: defaultdict[str, list[str]] = defaultdict(list)
     for change in report["changes"]:
@@ -295,24 +308,30 @@ def lines_of(report: dict[str, Any]) -> Iterator[str]:
         places[change["what"]] += [change["pointer"]] if change["pointer"] else []
     for what, count in said.items():
         first, *others = places[what] or [""]
-        where = f"{first} and {len(others)} more places" if others else first
-        yield f"{count} × {what} ({where})" if where else f"{count} × {what}"
+        where = (
+            f"{first} and {len(others)} more place{'s' * (len(others) > 1)}" if others else first
+        )
+        if name := names.get("/".join(first.split("/")[:3])):
+            where = f"{name}, {where}"
+        yield _line(count, what) + (f" ({where})" if where else "")
     for name, count in report["dropped"].items():
         what = f"{name.replace('_', ' ')} dropped"
         if count and what not in said:
-            yield f"{count} × {what}"
+            yield _line(count, what)
     irregular = report["levels"][0]["edges"]["irregular"] if report["levels"] else 0
     if irregular:
-        yield f"{irregular} × non-manifold edge, refined as a border"
+        yield _line(irregular, "non-manifold edge, refined as a border")
 
 
-def advice_lines(report: dict[str, Any]) -> list[str]:
-    """Return the report's advice, with the options as the command line spells them."""
-    spelt = {"crease=": "--crease ", "weld_tolerance=": "--weld-tolerance "}
-    lines = report["advice"]
-    for option, flag in spelt.items():
-        lines = [line.replace(option, flag) for line in lines]
-    return lines
+def _line(count: int, what: str) -> str:
+    hint = hint_on(what)
+    return f"{count:,} × {what}" + (f": {as_flags(hint)}" if hint else "")
+
+
+def as_flags(text: str) -> str:
+    """Return advice with the options as the command line spells them."""
+    options = r"\b(compress|crease|normals|weld_tolerance)="
+    return re.sub(options, lambda found: f"--{found[1].replace('_', '-')} ", text)
 
 
 def _kind(name: str, path: Path) -> str:
@@ -334,6 +353,7 @@ class Written:
 
     Attributes:
         content, report, faces: its bytes, its report, how many faces it has.
+        triangles: how many these make.
         faces_in: how many the input has.
         seconds: what each stage took.
         parents: the arrays of a map of its vertices, if asked for.
@@ -342,6 +362,7 @@ class Written:
     content: bytes
     report: dict[str, Any]
     faces: int
+    triangles: int
     seconds: dict[str, float] = field(default_factory=dict)
     faces_in: int = 0
     parents: Arrays = field(default_factory=dict)
@@ -350,18 +371,18 @@ class Written:
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:
     faces = report["totals"]["faces"]
     if target == "glb":
-        return Written(glb, report, faces)
+        return Written(glb, report, faces, faces)
     if target == "gltf":
-        return Written(as_gltf_json(glb, limits), report, faces)
+        return Written(as_gltf_json(glb, limits), report, faces, faces)
     mesh, changes = flatten(glb, target, limits)
     kept, lost = held(mesh, target)
     # A mesh that several nodes show is there several times.
     report = _with_changes(report, [*changes, *lost])
-    return Written(FORMATS[target].write(kept), report, len(kept.faces))
+    return Written(FORMATS[target].write(kept), report, len(kept.faces), len(kept.faces))
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
-    return report | {"changes": [*report["changes"], *(asdict(change) for change in changes)]}
+    return report | changes_of([*(Change(**each) for each in report["changes"]), *changes])
 
 
 @contextmanager

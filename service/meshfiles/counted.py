@@ -35,7 +35,7 @@ def count_triangles(data: bytes, kind: str) -> int:
         return _of_ply(data)
     text = plain_text(data)
     if kind == "obj":
-        return sum(_triangles(words[firsts == ord("f")]) for words, firsts in _lines(text))
+        return sum(_triangles(words[firsts | 32 == ord("f")]) for words, firsts in _lines(text))
     start = plain_letters(text[:START], continued=False)[0].tobytes()
     header = off.HEADER.match(start)
     numbers = start[header.end() :].split(maxsplit=2)[:2] if header else []

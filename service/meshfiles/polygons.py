@@ -21,7 +21,7 @@ from pns_common.refinement import Refinement, refine
 from pns_common.report import Report
 from pns_common.rows import distinct_rows, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
-from pns_common.topology import EdgeClass, following
+from pns_common.topology import following
 
 from ..advice import Bends, count_bends
 from ..course import Course
@@ -321,9 +321,9 @@ def _covering(mesh: Mesh) -> Int[np.ndarray, "T 3"]:
 def _smooth_normals(made: Refinement) -> Layer:
     """Return normals that are smooth but across the edges that are sharp at the last level."""
     mesh, last, sharp = made.mesh, made.topologies[-1], None
-    if len(last.crease_edges):
+    if last.is_sharp.any():
         fine = CATMULL_CLARK.split(last, Blocks())
-        begins = fine.edge_class[fine.corner_edges] == EdgeClass.CREASE
+        begins = fine.is_sharp[fine.corner_edges]
         begins = begins if made.selected is None else begins[made.selected.places]
         ends = mesh.corners[following(mesh.offsets)]
         sharp = np.stack([mesh.corners, ends], axis=1)[begins]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pns_common.errors import MeshError
+from pns_common.mesh import fans
 from pns_common.rows import marked
 from pns_common.schemes import Scheme
 
@@ -22,6 +23,7 @@ from ..gltf.read.plan import (
     check_memory,
 )
 from ..gltf.refine.meshes import refine_alone, stage_shares
+from ..gltf.refine.new_normals import MOST, are_one
 from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
@@ -41,7 +43,8 @@ def refine_mesh_file(
 ) -> tuple[MeshFile, dict[str, Any]]:
     """Refine triangles, or polygons where the scheme is one of polygons; return also the report.
 
-    `normals=auto` keeps normals, and adds none to a mesh without. `traced` asks for the parents of
+    `normals=auto` adds none to a mesh without, keeps those that there are, and makes new ones where
+    these are flat and no edge is to stay sharp. `traced` asks for the parents of
     vertices.
 
     Raises:
@@ -50,11 +53,13 @@ def refine_mesh_file(
     """
     course = Course() if course is None else course
     check_cost(mesh, options, limits)
+    grouped = with_group_normals(mesh)
     if options.normals == "auto":
-        options = replace(options, normals="keep")
+        smooth = options.crease == "off" and _is_flat(grouped)
+        options = replace(options, normals="smooth" if smooth else "keep")
     refine = refine_polygons if scheme.base.polygons else _refine_triangles
     try:
-        made = refine(with_group_normals(mesh), scheme, options, course, traced=traced)
+        made = refine(grouped, scheme, options, course, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if NORMAL not in mesh.layers and options.normals == "keep":
@@ -77,6 +82,14 @@ def refine_mesh_file(
     changes = [*mesh.changes, *made.changes]
     report = build_report(scheme, options.levels, [result], int(used.sum()), changes)
     return made.mesh, report
+
+
+def _is_flat(mesh: MeshFile) -> bool:
+    """Return whether there are normals, and most faces have one."""
+    layer = mesh.layers.get(NORMAL)
+    if layer is None or (layer.rows < 0).any():
+        return False
+    return bool(are_one(layer.values[layer.rows][fans(mesh.offsets)[0]]).mean() > MOST)
 
 
 def _refine_triangles(
@@ -125,6 +138,7 @@ def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit
-    each += BYTES_FOR_NORMALS * (options.normals not in ("auto", "keep"))
+    kept = options.normals == "keep" or (options.normals == "auto" and options.crease != "off")
+    each += BYTES_FOR_NORMALS * (not kept)
     each += compression.BYTES_PER_FACE[options.compress]
     check_memory(faces * each, limits)

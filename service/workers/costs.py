@@ -1,4 +1,4 @@
-"""Predict the cost of a job, for the order of jobs and for the budgets of clients."""
+"""Predict the cost of jobs, for their order and for budgets; learn how slow the machine is."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from pns_common import Mesh, ModelError, loop, pns, refine, sharp_edges, sharpne
 from pns_common.level import Level
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
-from pns_common.schemes import LOOP
+from pns_common.schemes import CATMULL_CLARK, LOOP
 from pns_common.sharpness import creases_by_name, learned_sharpness, sharpness_inputs
 from pns_common.topology import build_topology
 from tests.support.meshes import (
@@ -25,6 +25,7 @@ from tests.support.meshes import (
     tilted_plane,
 )
 from tests.support.networks import DEFAULT_CARD, sharpening_model
+from tests.support.polygons import cylinder
 from tests.support.renumbering import mirrored, renumbered, turned_over
 from tests.support.stand_in_models import ZeroModel
 
@@ -70,6 +71,30 @@ def test_features_are_finite_and_bounded(mesh):
     assert np.isfinite(features).all()
     assert np.abs(features).max(initial=0) <= 4
     assert ((gate >= 0) & (gate <= 1)).all()
+
+
+def test_wing_edges_in_an_n_gon_are_those_of_its_fan():
+    """A cap is as plane as the same cap cut into triangles around its middle."""
+    points, faces = cylinder(9)
+    middles = [len(points), len(points) + 1]
+    cut = np.concatenate([points, points.reshape(2, 9, 3).mean(axis=1)])
+    spokes = [
+        [a, b, middle]
+        for cap, middle in zip(faces[:2], middles, strict=True)
+        for a, b in zip(cap, cap[1:] + cap[:1], strict=True)
+    ]
+    found = {}
+    for name, mesh in (("n-gons", Mesh(points, faces)), ("fans", Mesh(cut, spokes + faces[2:]))):
+        level = Level(mesh.vertices, mesh.topology(), CATMULL_CLARK, None, Blocks())
+        rows, features, _ = sharpness_inputs(level, C_V)
+        ends = np.sort(level.topology.edges[rows].astype(int), axis=1)
+        rim = np.flatnonzero((ends // 9 == ends[:, :1] // 9).all(axis=1) & (ends < 18).all(axis=1))
+        found[name] = features[rim[np.lexsort(ends[rim].T)]]
+    assert len(found["n-gons"]) == 18
+    wings, both = [2, 3, 4, 5, 6], [8, 9]
+    np.testing.assert_allclose(
+        found["n-gons"][:, wings + both], found["fans"][:, wings + both], atol=1e-12
+    )
 
 
 def test_features_of_a_box():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pns_common import Mesh, ModelError, subdivide
+from pns_common import Mesh, ModelError, pns, sharp_edges, subdivide
 from pns_common.model import file as model_file
 from pns_common.model.file import (
     BUNDLED,
@@ -126,3 +126,16 @@ def test_a_drum_of_twelve_sides_is_round_and_a_box_of_quads_a_box(levels):
     sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
     box = subdivide(Mesh(corners, sides), levels=levels).vertices
     np.testing.assert_allclose(np.abs(box).max(axis=1), 0.5, atol=0.005)
+
+
+def test_rims_of_a_drum_stay_sharp_where_loops_run_around_it():
+    points, faces = cylinder(12, height=0.7)
+    rings = np.concatenate([points, points[12:] + np.array([0, 0, 0.7])])
+    lid = [v + 12 for v in faces[1]]
+    mesh = Mesh(rings, [faces[0], lid, *faces[2:], *(np.array(faces[2:]) + 12).tolist()])
+    sharp = np.sort(sharp_edges(mesh, scheme=pns(load_model())), axis=1)
+    rims = [sorted((k, (k + 1) % 12)) for k in range(12)]
+    expected = [*rims, *([a + 24, b + 24] for a, b in rims)]
+    assert sorted(sharp.tolist()) == sorted(expected)
+    moved = subdivide(mesh, levels=1).vertices[:36] - rings
+    assert np.linalg.norm(moved, axis=1).max() < 0.03

@@ -7,7 +7,7 @@ import pytest
 
 from pns_common import loop
 from service.gltf.subdivide import subdivide_gltf
-from service.meshfiles.convert import advice_lines
+from service.meshfiles.convert import as_flags
 from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
@@ -15,7 +15,10 @@ from tests.service.gltf.test_options import cylinder
 from tests.support.gltf.files import glb
 from tests.support.gltf.shapes import box, octahedron
 
-CUBE = "12 of 12 bent edges are kept sharp: use crease=off for a rounder shape"
+CUBE = (
+    "12 of 12 bent edges are kept sharp: "
+    "use crease=off to round everything; pieces that only touch may come apart"
+)
 
 
 def advice(*meshes, **options):
@@ -34,6 +37,18 @@ def test_a_shape_that_gets_round_says_nothing():
     (line,) = advice([cylinder()], crease="angle:60")
     assert line.startswith("16 of 24 ")
     assert advice([cylinder()], crease="angle:100") == []
+
+
+def test_an_angle_that_keeps_fewer_edges_comes_first():
+    # The two rims have 64 edges; the 32 between sides bend by 11 degrees.
+    (line,) = advice([cylinder(32)], crease="angle:5")
+    kept, offered = line.split(": use ")
+    assert kept == "96 of 96 bent edges are kept sharp"
+    assert offered.startswith("crease=angle:40, which keeps 64, for a rounder shape, or crease=off")
+    assert offered.endswith("pieces that only touch may come apart")
+    assert advice([cylinder(32)], crease="angle:40") == [
+        CUBE.replace("12 of 12", "64 of 96"),
+    ]
 
 
 @pytest.mark.parametrize("alone", [False, True])
@@ -72,5 +87,4 @@ def test_mesh_files_say_the_same_and_the_command_spells_its_own_options():
     chosen = Options(scheme="loop", crease="angle:60")
     _, report = refine_mesh_file(triangles, loop(), chosen, Limits())
     assert report["advice"] == [CUBE]
-    (line,) = advice_lines(report)
-    assert line == "12 of 12 bent edges are kept sharp: use --crease off for a rounder shape"
+    assert as_flags(report["advice"][0]) == CUBE.replace("crease=", "--crease ")

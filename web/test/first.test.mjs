@@ -104,6 +104,21 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.locator("#advice").waitFor({ state: "hidden" });
   });
 
+  test("an angle that keeps fewer edges is offered first, in the words of its settings", async () => {
+    const page = await visit({ hash: "#levels=1&crease=angle&angle=5" });
+    // A prism of sixteen sides: its rims bend by 90 degrees, its other edges by 22.
+    const around = [...Array(16).keys()];
+    const corners = around.flatMap((i) => [0, 1].map((z) => `v ${Math.cos((i * Math.PI) / 8)} ${Math.sin((i * Math.PI) / 8)} ${z}`));
+    const sides = around.map((i) => [2 * i, 2 * ((i + 1) % 16), 2 * ((i + 1) % 16) + 1, 2 * i + 1]);
+    const ends = [[...around].reverse().map((i) => 2 * i), around.map((i) => 2 * i + 1)];
+    const faces = [...sides, ...ends].map((face) => `f ${face.map((v) => v + 1).join(" ")}`);
+    await choose(page, { name: "prism.obj", mimeType: "", buffer: Buffer.from([...corners, ...faces, ""].join("\n")) });
+    await settled(page);
+    const advice = await page.textContent("#advice");
+    assert.match(advice, /48 of 48 bent edges are kept sharp: choose Sharp edges: By angle, above 40°, which keeps 32/);
+    assert.equal(await page.textContent("label[for=angle]"), "Angle above");
+  });
+
   test("faces that only touch are told of, and joined by the setting that is named", async () => {
     const page = await visit({ hash: "#levels=1" });
     // Two triangles whose common edge is open by a hundred-thousandth.

@@ -1,4 +1,8 @@
-"""Read and write the GLB container (glTF 2.0 §4): a header and chunks."""
+"""Read and write the GLB container (glTF 2.0 §4) and its JSON, with limits before decoding.
+
+A decoder's cost is in the values that it makes: 64 MiB of `{},` make tens of millions of objects.
+So the raw bytes are searched first for the characters that open or separate values.
+"""
 
 from __future__ import annotations
 
@@ -207,7 +211,9 @@ def read_glb(data: bytes | memoryview) -> Container:
     if version != GLB_VERSION:
         raise UnreadableError(f"GLB version {version}, expected {GLB_VERSION}")
     if not _HEADER.size <= length <= len(data):
-        raise UnreadableError(f"the GLB header says {length} bytes, the file has {len(data)}")
+        short = ": the file is cut short" if length > len(data) else ""
+        text = f"the GLB header says {length} bytes, the file has {len(data)}{short}"
+        raise UnreadableError(text)
     chunks = _chunks(memoryview(data)[:length])
     if not chunks or chunks[0][0] != JSON_CHUNK:
         raise UnreadableError("the first chunk of the GLB is not JSON")

@@ -54,7 +54,7 @@ def near_misses(
 
 def near_miss_changes(count: int, pointer: str) -> list[Change]:
     """Return the report's entry on border vertices that nearly meet, in the mesh at `pointer`."""
-    what = "border vertices lie within 1e-5 R of another: weld_tolerance joins them"
+    what = "border vertices lie within 1e-5 R of another"
     return [Change(pointer, what, count)] if count else []
 
 

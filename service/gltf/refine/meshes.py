@@ -183,7 +183,7 @@ def _together(
     for place, primitives in enumerate(read):
         kind = kind_of(primitives)
         if kind is not None:
-            groups[kind].append(place)
+            groups[kind, with_normal_rule(options, primitives).normals].append(place)
     outcomes: dict[int, MeshOutcome] = {}
     for number, places in enumerate(groups.values()):
         meshes = [read[place] for place in places]

@@ -22,6 +22,10 @@ from .normals import corner_normals, safe_unit
 
 # An edge whose faces' normals have a cosine this far below 1 is bent: a twelfth of a degree.
 BENT = 1e-6
+# Normals that differ by less are one: exporters round them face by face.
+SAME = 1e-3
+# From this share of faces with one normal on, a mesh is shaded flat.
+MOST = 0.5
 
 
 def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
@@ -80,11 +84,25 @@ def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
 
 
 def with_normal_rule(options: Options, primitives: Sequence[TrianglePrimitive]) -> Options:
-    """Return the options with `normals=auto` decided: smooth for a mesh without any normals."""
+    """Return the options with `normals=auto` decided.
+
+    Smooth for a mesh without any normals, and where no edge is to stay sharp for one of which most
+    faces are shaded flat: its normals would show the faces that it had.
+    """
     if options.normals != "auto":
         return options
-    given = any("NORMAL" in primitive.attributes for primitive in primitives)
-    return replace(options, normals="keep" if given else "smooth")
+    given = [p for p in primitives if "NORMAL" in p.attributes]
+    if given and options.crease != "off":
+        return replace(options, normals="keep")
+    flat = (are_one(p.attributes["NORMAL"][p.corners]) for p in given)
+    smooth = not given or np.concatenate([*flat]).mean() > MOST
+    return replace(options, normals="smooth" if smooth else "keep")
+
+
+def are_one(normals: Float[np.ndarray, "F T 3"]) -> Bool[np.ndarray, " F"]:
+    """Return which faces have one normal at all of their corners."""
+    same: Bool[np.ndarray, " F"] = np.all(np.abs(normals - normals[:, :1]) < SAME, axis=(1, 2))
+    return same
 
 
 def with_smooth_normals(

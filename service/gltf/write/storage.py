@@ -15,7 +15,7 @@ from pns_common.matrix import SubdivisionMatrix
 from ...report import Change
 from ..constants import FAN, FLOAT, NGONS, STRIP, SURFACES
 from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
-from ..read.extensions import withdraw
+from ..read.extensions import drop, withdraw
 from ..read.plan import MeshPlan, Spare
 from ..read.schema import Document, Mesh, Primitive
 from ..refine.together import MeshOutcome
@@ -26,7 +26,6 @@ from .writer import Writer
 REPORT_KEY, OLD_VALUE_KEY = "pns", "extras"
 
 _MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
-
 
 Arrays = dict[str, Shaped[np.ndarray, "..."]]
 
@@ -65,9 +64,7 @@ def leave_out_ngons(tree: dict[str, Any], mesh: int, numbers: Iterable[int]) -> 
     for number in numbers:
         primitive = tree["meshes"][mesh]["primitives"][number]
         if NGONS in primitive.get("extensions", {}):
-            del primitive["extensions"][NGONS]
-            if not primitive["extensions"]:
-                del primitive["extensions"]
+            drop(primitive, NGONS)
             what = f"{NGONS} left out: other triangles are in place of its own"
             changes.append(Change(f"/meshes/{mesh}/primitives/{number}", what, 1))
     return changes

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from ...errors import JobTimeout, ServiceError, WorkerDied
 
@@ -25,16 +25,7 @@ MOST = 256
 FIRST = 1
 
 
-class Attempted(Protocol):
-    """A frozen dataclass that says how often it is tried now, from 1 on."""
-
-    @property
-    def attempt(self) -> int:
-        """1, then 2 where the first worker died or hung, …"""
-        ...
-
-
-T = TypeVar("T", bound=Attempted)
+T = TypeVar("T")
 R = TypeVar("R")
 Engine = Callable[[Iterator[T]], Iterator[list[R]]]
 
@@ -45,7 +36,7 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Work(Generic[T, R]):
-    """Work on each task.
+    """Work on each task: a frozen dataclass whose `attempt` says how often it is tried, from 1 on.
 
     Attributes:
         job: done in a worker; what it raises is raised by the engine.
@@ -61,10 +52,10 @@ class Work(Generic[T, R]):
 
     def again(self, task: T) -> T | None:
         """Return a task whose worker is lost, to be tried once more; None if tried enough."""
-        if task.attempt >= MOST_ATTEMPTS:
+        tried: Any = task
+        if tried.attempt >= MOST_ATTEMPTS:
             return None
-        changed: Any = task
-        return replace(changed, attempt=task.attempt + 1)
+        return replace(tried, attempt=tried.attempt + 1)
 
     def given_up(self, task: T, *, late: bool) -> R:
         """Return what a task gives whose last worker died, or hung, as far as is known."""

@@ -97,6 +97,14 @@ def test_help_says_which_numbers_are_taken(pns: Any) -> None:
         assert taken in said
 
 
+def test_help_has_everyday_options_first(pns: Any) -> None:
+    said = pns("subdivide", "--help").out
+    order = ("Everyday", "--output", "--levels", "--crease", "--scheme", "Files", "--to")
+    order += ("Research", "--map", "--budget", "--reference-length", "--diagnostics")
+    places = [said.index(word) for word in order]
+    assert places == sorted(places)
+
+
 def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
     listed = pns("info").out.splitlines()
     assert set(bundled_models()) <= {line.partition(" ")[0] for line in listed}

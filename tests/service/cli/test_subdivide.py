@@ -50,7 +50,39 @@ def test_what_happens_in_many_places_is_said_once(pns: Any, tmp_path: Path) -> N
     outcome = pns("subdivide", "strips.glb", "-o", "out.glb", *ONCE)
     told = [line for line in outcome.err.splitlines() if "strip" in line and "×" in line]
     place = "/meshes/0/primitives/0/mode and 2 more places"
-    assert told == [f"3 × triangle strip written as triangles ({place})"]
+    assert told == [f"3 × triangle strip written as triangles: harmless ({place})"]
+
+
+def test_a_note_names_the_mesh_and_says_what_to_do(pns: Any, tmp_path: Path) -> None:
+    turned = {**box(), "NORMAL": -box()["NORMAL"]}
+    tree, binary = files.document([box()], [turned])
+    tree["meshes"][1]["name"] = "Left arm"
+    (tmp_path / "in.glb").write_bytes(files.pack(tree, binary))
+    outcome = pns("subdivide", "in.glb", "-o", "out.glb", "--report", "r.json", *ONCE)
+    (line,) = [line for line in outcome.err.splitlines() if "points away" in line]
+    assert line.endswith(
+        "if they show as dark spots use --normals smooth (Left arm, /meshes/1/primitives/0)"
+    )
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert [mesh.get("name") for mesh in report["meshes"]] == [None, "Left arm"]
+    (hint,) = report["hints"].values()
+    assert hint == "if they show as dark spots use normals=smooth"
+    outcome = pns("subdivide", "in.glb", "-o", "out.glb", "--normals", "smooth")
+    assert "points away" not in outcome.err
+
+
+def test_quads_are_told_in_triangles_too(pns: Any, tmp_path: Path) -> None:
+    quads = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    quads += "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    (tmp_path / "in.obj").write_text(quads)
+    for target, made in (("obj", "24 faces, 48 triangles,"), ("glb", "24 faces, 48 triangles,")):
+        outcome = pns("subdivide", "in.obj", "-o", f"out.{target}", "--levels", "1")
+        assert f"out.{target}: {made} in " in outcome.err
+        assert "; --levels 2 would give 192 triangles" in outcome.err
+    outcome = pns("subdivide", "in.obj", "-o", "out.stl", "--levels", "1")
+    assert "out.stl: 48 faces in " in outcome.err
+    outcome = pns("subdivide", "in.obj", "-o", "out.obj", "--levels", "6")
+    assert "would give" not in outcome.err
 
 
 # One level of Loop: what is asked here is no matter of depth.
@@ -115,9 +147,9 @@ def test_every_loss_is_a_line_once(pns: Any, tmp_path: Path) -> None:
     text = "OFF\n5 2 0\n0 0 0\n1 0 0\n0 1 0\n9 9 9\n8 8 8\n3 0 1 2\n3 0 3 3\n"
     (tmp_path / "in.off").write_text(text)
     outcome = pns("subdivide", "in.off", "-o", "out.off", *ONCE)
-    assert "1 × degenerate faces dropped\n" in outcome.err
-    assert "1 × vertices dropped\n" in outcome.err
-    assert "1 × vertices dropped that no face uses\n" in outcome.err
+    assert "1 × degenerate faces dropped: harmless, they have no area\n" in outcome.err
+    assert "1 × vertices dropped: harmless\n" in outcome.err
+    assert "1 × vertices dropped that no face uses: harmless\n" in outcome.err
     assert "duplicate" not in outcome.err
     tree = tree_of_bytes(part_glb())
     indices = tree["accessors"][tree["meshes"][0]["primitives"][0]["indices"]]

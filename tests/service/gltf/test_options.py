@@ -94,6 +94,17 @@ def test_smooth_normals_and_absent_ones_make_no_crease():
         assert "crease" not in subdivide([shape], crease="normals").report["levels"][0]["edges"]
 
 
+@pytest.mark.parametrize(
+    ("shape", "crease", "smooth"),
+    [(box(), "off", True), (box(), "auto", False), (cylinder(), "off", False)],
+)
+def test_flat_shading_goes_where_no_edge_is_to_stay_sharp(shape, crease, smooth):
+    _, attributes = files.primitive_of(subdivide([shape], [shape], crease=crease).glb)
+    points, normals = attributes["POSITION"].round(4), attributes["NORMAL"].round(4)
+    several = len(np.unique(np.hstack([points, normals]), axis=0)) > len(np.unique(points, axis=0))
+    assert several != smooth
+
+
 def test_the_tip_of_a_cone_makes_no_creases():
     # Each side has its own normal at the tip, and shares those along the base.
     sides = 6

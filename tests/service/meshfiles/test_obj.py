@@ -138,7 +138,7 @@ def test_an_off_may_begin_with_a_mark_of_its_encoding():
 
 
 def test_faces_behind_blanks_are_counted():
-    assert count_triangles((POSITIONS + "f 1 2 3\n\t f 1 2 3 4\n").encode(), "obj") == 3
+    assert count_triangles((POSITIONS + "f 1 2 3\n\t F 1 2 3 4\n").encode(), "obj") == 3
 
 
 def test_words_of_comments_are_no_corners():

@@ -193,6 +193,16 @@ def is_closed(mesh: MeshFile) -> bool:
     return len({*there}) == len(there) and {*there} == {(b, a) for a, b in there}
 
 
+def test_edges_that_a_model_keeps_sharp_break_the_shading_of_quads() -> None:
+    chosen = Options(normals="smooth")
+    written = converted(cube(), "obj", "obj", chosen, load_model(), Limits())
+    mesh = formats.read_polygons(written.content, "obj")
+    normals = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows].reshape(6, -1, 3)
+    sides = np.array(CORNERS)[np.array(QUADS)].mean(axis=1)
+    # Rounded over, a normal at an edge would be 45 degrees from its side's.
+    assert (np.einsum("scx,sx->sc", normals, sides) > np.cos(np.radians(10))).all()
+
+
 @pytest.mark.parametrize("normals", ["keep", "smooth", "limit"])
 def test_normals_beside_chosen_polygons_are_those_of_what_is_left(normals: str) -> None:
     outward = np.array(CORNERS) / 3**0.5

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Creases, loop
-from service.meshfiles.mesh_file import UV, Layer, of_triangles
+from pns_common import Creases, catmull_clark, loop
+from service.meshfiles.mesh_file import NORMAL, UV, Layer, of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.support.gltf.shapes import box, octahedron
@@ -38,6 +38,19 @@ def test_mesh_files_keep_the_edges_that_the_model_asks_for():
     for scheme, crease, count in ((ASKING, "auto", 12), (ASKING, "off", 0), (loop(), "auto", 0)):
         _, report = refined(box(), scheme=scheme, crease=crease)
         assert report["levels"][0]["edges"].get("crease", 0) == count
+
+
+@pytest.mark.parametrize("scheme", [loop(), catmull_clark()])
+def test_flat_shading_goes_where_no_edge_is_to_stay_sharp(scheme):
+    shape = box()
+    triangles = of_triangles(shape["POSITION"], shape["indices"])
+    flat = {NORMAL: Layer(shape["NORMAL"], triangles.corners)}
+    triangles = replace(triangles, layers=flat)
+    for crease, smooth in (("off", True), ("auto", False)):
+        made, _ = refine_mesh_file(triangles, scheme, Options(crease=crease), Limits())
+        points, normals = positions(made).round(6), at_corners(made, NORMAL).round(6)
+        both = np.unique(np.hstack([points, normals]), axis=0)
+        assert (len(both) == len(np.unique(points, axis=0))) == smooth
 
 
 def test_smooth_uvs_follow_the_positions_of_a_closed_chart():

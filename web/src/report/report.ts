@@ -29,6 +29,8 @@ export interface Report {
   totals: { vertices: number; faces: number };
   dropped: Record<string, number>;
   changes: { pointer: string; what: string; count: number }[];
+  /** By what was changed: whether that is harmless, or what to do. */
+  hints?: Record<string, string>;
   levels: Level[];
   meshes: MeshReport[];
   /** Why little changed, and which setting changes that. */
@@ -38,6 +40,8 @@ export interface Report {
 export interface MeshReport {
   /** Its place in the file's `meshes`. */
   index: number;
+  /** What the file calls it. */
+  name?: string;
   learned_levels: number;
   /** No point of the limit surface is farther from the classic rule's, in the mesh's own units. */
   limit_distance: number;

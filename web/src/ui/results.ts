@@ -40,15 +40,22 @@ export function showPromises(report: Report, lengths: Lengths): string {
 
 /** The settings that advice may name: the service's options, and the page's words. */
 const WORDS: [RegExp, string][] = [
-  [/\b(use|choose) crease=off/, "choose Sharp edges: None"],
-  [/\b(use|choose) weld_tolerance=[\d.]+/, "switch on Close small gaps"],
+  [/\buse crease=angle:(\d+)/, "choose Sharp edges: By angle, above $1°"],
+  [/\b(use )?crease=off/, "choose Sharp edges: None"],
+  [/\buse normals=smooth/, "choose Shading: Smooth"],
+  [/\buse weld_tolerance=[\d.]+/, "switch on Close small gaps"],
 ];
 
-/** Show why little changed, in the page's own words for the settings. */
+/** Say it in the page's own words for the settings. */
+function inOurWords(text: string): string {
+  return WORDS.reduce((said, [option, word]) => said.replace(option, word), text);
+}
+
+/** Show why little changed. */
 export function showAdvice({ advice = [] }: Report): void {
   element("advice").hidden = !advice.length;
   element("advice").replaceChildren(
-    ...advice.map((text) => make("li", { textContent: WORDS.reduce((said, [option, word]) => said.replace(option, word), text) })),
+    ...advice.map((text) => make("li", { textContent: inOurWords(text) })),
   );
 }
 
@@ -103,16 +110,24 @@ export function showChanges(report: Report): void {
   element("changes-count").textContent = all.length ? String(all.length) : "none";
   element("changes").replaceChildren(
     ...(all.length
-      ? all.map(({ pointer, what, count: n }) =>
-          make(
+      ? all.map(({ pointer, what, count: n }) => {
+          const hint = report.hints?.[what];
+          const place = [nameAt(report, pointer), pointer].filter(Boolean).join(", ");
+          return make(
             "li",
             {},
-            `${n > 1 ? `${count(n)} × ` : ""}${what}`,
-            ...(pointer ? [make("span", { className: "where", textContent: pointer })] : []),
-          ),
-        )
+            `${n > 1 ? `${count(n)} × ` : ""}${what}${hint ? `: ${inOurWords(hint)}` : ""}`,
+            ...(place ? [make("span", { className: "where", textContent: place })] : []),
+          );
+        })
       : [make("li", { className: "note", textContent: "Nothing beside the geometry changed." })]),
   );
+}
+
+/** The name of the mesh that a pointer leads to; "" without one. */
+function nameAt({ meshes }: Report, pointer: string): string {
+  const index = Number(/^\/meshes\/(\d+)/.exec(pointer)?.[1]);
+  return meshes.find((mesh) => mesh.index === index)?.name ?? "";
 }
 
 export function showValidation(comparison: Comparison | string): void {

@@ -86,6 +86,14 @@ def test_wrong_bounds_are_unreadable(kind):
         read_glb(BROKEN[kind])
 
 
+def test_a_file_that_was_cut_short_says_so():
+    with pytest.raises(UnreadableError, match="the file is cut short"):
+        read_glb(WHOLE[:-1])
+    with pytest.raises(UnreadableError) as refusal:
+        read_glb(WHOLE[:8] + struct.pack("<I", 3) + WHOLE[12:])
+    assert "short" not in str(refusal.value)
+
+
 def test_what_a_container_cannot_hold_is_refused_before_it_is_joined():
     with pytest.raises(LimitError, match="bytes"):
         write_glb(b"{}", [Claimed()], [])

@@ -31,6 +31,7 @@ OPTIONS = [
     {"uv": "smooth"},
     {"crease": "normals", "levels": 2},
     {"crease": "angle:30"},
+    {"crease": "off"},
     {"reference_length": 1.0},
     {"compress": "meshopt"},
     {"normals": "smooth"},
