@@ -1,6 +1,7 @@
 """The feature sets that a model card may name, as data: columns, ranges, signs and symmetries.
 
-``kernels.frames`` and ``kernels.measures`` compute the columns; docs/features.md defines them.
+``kernels.frames`` and ``kernels.measures`` compute the columns, docs/reference/features.md defines
+them.
 
 With c to the left of a → b, a stencil (a, b, c, d) can still be read in two ways, and a mirrored or
 turned-over mesh is read in its own. Each of these symmetries is a signed permutation g of the

@@ -73,13 +73,11 @@ class Level:
             vars(made)["faces"] = self.faces
         return made
 
-    def measure(self, *, rings: bool, bends: bool) -> None:
+    def measure(self, *, rings: bool) -> None:
         """Make the measurements that several threads are about to read."""
         _ = self.normals, self.logs
         if rings:
-            _ = self.rings
-        if bends:
-            _ = self.face_bends, self.ringed
+            _ = self.rings, self.ringed
 
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
@@ -112,24 +110,6 @@ class Level:
 
         self.blocks.run(len(logs), take)
         return logs
-
-    @cached_property
-    def face_bends(self) -> Float[np.ndarray, " F"]:
-        """Mean of x over the edges of each face; less of a soft edge, by its sharpness."""
-        mesh, jumps = self.topology, self.edges.jumps
-        if len(mesh.soft):
-            jumps = jumps * (1 - mesh.soft)
-        bends = np.empty(mesh.face_count)
-        if not mesh.triangles:
-            sums = np.add.reduceat(jumps[mesh.corner_edges], mesh.offsets[:-1])
-            return sums / np.diff(mesh.offsets)
-
-        def take(begin: int, end: int) -> None:
-            first, second, third = jumps[mesh.face_edges[begin:end]].T
-            bends[begin:end] = (first + second + third) / 3
-
-        self.blocks.run(len(bends), take)
-        return bends
 
     @cached_property
     def rings(self) -> RingMeasures:

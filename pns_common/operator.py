@@ -17,17 +17,17 @@ The default's rule, models of format 4, acts at the control mesh alone:
     h          the edge's length; elsewhere the root mean square of the ring's or face's edges
     ℓ          h, or less where that is long and thin: at an edge at most the mean altitude of what
                lies across it, at a face its shortest side
-    γ          the gate, 0 on planes: γ₂ + (1 − γ₂) tanh(c_v b) at edges, γ₂ = tanh(c x²),
-               x = 1 − n1 · n2, b the smaller mean of x over the edges of both faces;
-               tanh(c_v x_v) elsewhere, x_v the mean of x over the ring's or the face's edges
+    γ          the gate, 0 on planes: γ₂ + (1 − γ₂) γ_f at edges, γ₂ = tanh(c x²), x = 1 − n1 · n2,
+               γ_f of the face that is less open; γ_f at a face's vertex: the largest
+               (1 − w) tanh(c_v x) over its edges; tanh(c_v x_v) at an old vertex, x_v the mean
+               of x over its ring
     Π_ρ        shortens to length ρ, whatever the network answers
     s          the fold guard: no child turns by more than θ                         ``guard_scale``
 
 C is the budget, R the mesh's unit of length, τ the share of ℓ that the network may ask for. On a
 boundary or a crease there is no network: δ = Π_ρ(D) along the curve, so that meshes that share it
-still meet there. Sharpness in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an edge,
-(1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex, and (1 − w̄) δ at a face's vertex, w̄
-the mean over the face's edges.
+still meet there. Sharpness w in between blends both: (1 − w) δ + w Π_ρ(D along the curve) at an
+edge, and (1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old vertex.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     count, edges = len(level.points), mesh.interior
     x = base.place(level.points, mesh, level.blocks)  # x0
     has_prior = rule.prior_strength is not None
-    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL, bends=has_prior)
+    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL)
     if not has_prior:
         made = _Rows.starting_with(np.zeros((len(x), 3)))
 
@@ -171,7 +171,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         x += made.displacement
         return Additions(x, base_points, *made.arrays, None, degenerate, None)
 
-    curves = find_curves(level.points, mesh, len(x))
+    curves, opened = find_curves(level.points, mesh, len(x)), face_gates(level, rule)
     vertices, faces = np.flatnonzero(level.ringed), np.arange(len(x) - count - len(mesh.edges))
     delta, along = prior(level, rule, curves)  # D, to become δ
     made = _Rows.starting_with(delta)
@@ -181,12 +181,12 @@ def learned_level(level: Level, rule: Rule) -> Additions:
         made.correct(at, answers(rule.vertex_network, at), first=0)
 
     def at_edges(begin: int, end: int) -> int:
-        at = edge_inputs(level, rule, edges[begin:end])
+        at = edge_inputs(level, rule, edges[begin:end], opened)
         made.correct(at, answers(rule.edge_network, at), first=count)
         return int(at.degenerate.sum())
 
     def at_faces(begin: int, end: int) -> None:
-        at = face_inputs(level, rule, faces[begin:end])
+        at = face_inputs(level, rule, faces[begin:end], opened)
         made.correct(at, answers(rule.face_network, at, 1), first=count + len(mesh.edges))
 
     blocks.run(len(vertices), at_vertices)
@@ -244,16 +244,43 @@ def pushes(level: Level, rule: Rule) -> Float[np.ndarray, "V 3"]:
     return made
 
 
-def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
-    """Return what surrounds the network at interior edges."""
+def face_gates(level: Level, rule: Rule) -> Float[np.ndarray, " F"]:
+    """Return how open each face is: the largest (1 − w) tanh(c_v x) over its edges.
+
+    A flat face whose sides are sharp all around is shut, however it is cut into triangles.
+    """
+    mesh = level.topology
+    of_edges = np.tanh(rule.vertex_gate_sharpness * level.edges.jumps)
+    if len(mesh.soft):
+        of_edges *= 1 - mesh.soft
+    if mesh.triangles:
+        first, second, third = of_edges[mesh.face_edges].T
+        return np.maximum(np.maximum(first, second), third)
+    return np.maximum.reduceat(of_edges[mesh.corner_edges], mesh.offsets[:-1])
+
+
+def edge_inputs(
+    level: Level,
+    rule: Rule,
+    rows: Integer[np.ndarray, " N"],
+    opened: Float[np.ndarray, " F"] | None = None,
+) -> Inputs:
+    """Return what surrounds the network at interior edges.
+
+    Args:
+        level, rule: what they belong to.
+        rows: the edges.
+        opened: `face_gates`, if they are known already.
+    """
     mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
     basis = np.empty((count, 9))
     features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
     (curvature, sides, length, extent), degenerate = np.empty((4, count)), np.empty(count, bool)
     has_prior = rule.prior_strength is not None
     fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
-    bends = level.face_bends if has_prior else level.logs[:0]
-    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, bends
+    if opened is None:
+        opened = face_gates(level, rule) if has_prior else level.logs[:0]
+    measured = level.points, level.normals, fields, level.edges.lengths, level.logs, opened
     to = basis, curvature, sides, length, extent, degenerate, features
     if mesh.triangles:
         of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
@@ -264,7 +291,7 @@ def edge_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.
-        gate += (1 - gate) * np.tanh(rule.vertex_gate_sharpness * sides)
+        gate += (1 - gate) * sides
     return Inputs(
         rows,
         features,
@@ -296,12 +323,17 @@ def vertex_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> 
     )
 
 
-def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> Inputs:
-    """Return what surrounds the network at faces; z is the length along the normal."""
+def face_inputs(
+    level: Level,
+    rule: Rule,
+    rows: Integer[np.ndarray, " N"],
+    opened: Float[np.ndarray, " F"] | None = None,
+) -> Inputs:
+    """Return what surrounds the network at faces, likewise; z is the length along the normal."""
     mesh, count, edges = level.topology, len(rows), level.edges
     made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
     of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
-    of_edges = edges.lengths, edges.jumps, edges.bends, mesh.sharpness
+    of_edges = edges.lengths, edges.jumps, edges.bends
     frames.measure_face_vertices(
         level.points, level.rings.fields, *of_faces, *of_edges, rows, 0, count, made
     )
@@ -310,10 +342,10 @@ def face_inputs(level: Level, rule: Rule, rows: Integer[np.ndarray, " N"]) -> In
         rows,
         made[:, frames.FACE_FEATURES :].astype(rule.feature_type),
         basis,
-        gate=np.tanh(rule.vertex_gate_sharpness * level.face_bends[rows]),
+        gate=(face_gates(level, rule) if opened is None else opened)[rows],
         bound=budget_per_length(level, rule) * square,
         reach=rule.network_scale * made[:, frames.EXTENT],
-        weight=made[:, frames.SMOOTH],
+        weight=np.ones(count),
         degenerate=np.zeros(count, dtype=bool),
     )
 

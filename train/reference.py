@@ -1,8 +1,9 @@
 """The operator once more, in torch: gradients through positions, and an oracle for the kernels.
 
-Written from the paper and from the derivations behind docs/theorems.md, not from `pns_common`: it
-finds edges by itself, sums in any order, and runs at a thousandth of the kernels' speed. All is
-float64. Symbols are those of docs/features.md; a, b, c, d are an edge's ends and opposite vertices.
+Written from the paper and from the derivations behind docs/explanation/guarantees.md, not from
+`pns_common`: it finds edges by itself, sums in any order, and runs at a thousandth of the kernels'
+speed. All is float64. Symbols are those of docs/reference/features.md; a, b, c, d are an edge's
+ends and opposite vertices.
 
     format 1    q  = q0 + h² γ (C / R) F Π₁ η(φ)
     format 4    x' = x0 + s γ Π_ρ(D + τ ℓ F z(φ)),    ρ = C h² / R,    x0 = S_w p
@@ -98,12 +99,11 @@ class Surroundings:
         jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
         return jump, bend
 
-    @cached_property
-    def gentler_bend(self) -> Float[Tensor, " E"]:
-        """The smaller mean of x over the edges of an edge's two faces."""
-        jumps = (1 - self.mesh.sharpness) * self.turns[0][::2, 0]
-        bends = jumps[self.mesh.face_edges].mean(dim=1)
-        return bends[self.mesh.half_edges // 3].min(dim=1).values
+    def gates_beside(self, gate_sharpness: float) -> Float[Tensor, " E"]:
+        """Return the smaller gate of an edge's two faces: the largest (1 − w) tanh(c_v x)."""
+        gates = (1 - self.mesh.sharpness) * torch.tanh(gate_sharpness * self.turns[0][::2, 0])
+        of_faces = gates[self.mesh.face_edges].max(dim=1).values
+        return of_faces[self.mesh.half_edges // 3].min(dim=1).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +341,7 @@ class GeneralRule:
         interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
         ringed = mesh.ringed & (blend < 1)
         own = torch.tanh(self.gate_sharpness * frames.curvature**2)
-        opened = torch.tanh(self.vertex_gate_sharpness * around.gentler_bend)
+        opened = around.gates_beside(self.vertex_gate_sharpness)
         opened = torch.where(frames.degenerate, 0.0, opened)
         edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
         z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)

@@ -28,7 +28,7 @@ from train.fitting.trainer import Fit, fit
 from train.metrics.card import card_metrics
 from train.metrics.one_step import improvement_table, improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.recipe import Recipe
+from train.models.recipe import Recipe, of_length
 from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
 from train.output_file import prepare_output
@@ -71,11 +71,13 @@ def main(context: typer.Context) -> None:
 def train(
     recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
     seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
+    steps: Annotated[int | None, typer.Option(min=1, help="In place of the recipe's.")] = None,
     output: Output = None,
 ) -> None:
     """Train a recipe, write its checkpoint and print the held-out table."""
     console = Console()
     chosen = RECIPES[recipe](seed)
+    chosen = chosen if steps is None else of_length(chosen, steps)
     path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
     with _errors_told(console):
         prepare_output(path)

@@ -48,10 +48,9 @@ def edge_frame(n, m, spoke):
 
 
 @inlined
-def _extent(p, q, c, d):
-    """Return the length of an edge from p to q, or the mean altitude of c and d over it if less."""
+def _extent(h, p, q, c, d):
+    """Return h = ‖q − p‖, or the mean altitude of c and d over the edge from p to q if less."""
     spoke = difference(q, p)
-    h = root(dot(spoke, spoke))
     twice = norm(cross(spoke, difference(c, p))) + norm(cross(spoke, difference(d, p)))
     return min(h, twice / (2 * h)) if h > 0 else 0.0
 
@@ -63,7 +62,7 @@ def frames_and_features(
     fields,
     lengths,
     logs,
-    bends,
+    opened,
     corners,
     edges,
     corner_edges,
@@ -85,12 +84,12 @@ def frames_and_features(
     Args:
         fields: (V, 4) mean normals and umbrella heights; read by signed features alone.
         lengths, logs: (E,) lengths and their logarithms.
-        bends: (F,) mean x over the edges of each face; (0,) where it is not wanted.
+        opened: (F,) gates of the faces; (0,) where they are not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
-        sides: (N,) out: the smaller bend of both faces, 0 where there is no frame.
+        sides: (N,) out: the smaller gate of both faces, 0 where there is no frame.
         length: (N,) out: h.
         extent: (N,) out: ℓ.
         degenerate: (N,) out: whether the frame is the fallback.
@@ -118,10 +117,10 @@ def frames_and_features(
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(bends):
-            sides[to] = 0.0 if fallback else min(bends[h1 // 3], bends[h2 // 3])
+        if len(opened):
+            sides[to] = 0.0 if fallback else min(opened[h1 // 3], opened[h2 // 3])
         p, q = row(points, a), row(points, b)
-        extent[to] = _extent(p, q, row(points, c), row(points, d))
+        extent[to] = _extent(lengths[e], p, q, row(points, c), row(points, d))
         features[to, 0] = x
         features[to, LOGS] = logs[ac] - logs[e]
         features[to, LOGS + 1] = logs[bc] - logs[e]
@@ -191,7 +190,7 @@ def polygon_frames_and_features(
     fields,
     lengths,
     logs,
-    bends,
+    opened,
     corners,
     offsets,
     face_of_corner,
@@ -228,12 +227,12 @@ def polygon_frames_and_features(
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(bends):
-            sides[to] = 0.0 if fallback else min(bends[f], bends[g])
+        if len(opened):
+            sides[to] = 0.0 if fallback else min(opened[f], opened[g])
         c = wing(points, h1, corners, offsets, face_of_corner)
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)
-        extent[to] = _extent(p, q, c[:3], d[:3])
+        extent[to] = _extent(lengths[e], p, q, c[:3], d[:3])
         features[to, 0] = x
         features[to, LOGS] = _log_ratio(c, p, logs[e])
         features[to, LOGS + 1] = _log_ratio(c, q, logs[e])
@@ -248,8 +247,8 @@ def polygon_frames_and_features(
 
 # --- face vertices --------------------------------------------------------------------------------
 
-# Columns of a face's measures: its normal, h², ℓ, the mean of 1 − w over its edges, and face-8.
-NORMAL, SQUARE, EXTENT, SMOOTH, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 6, 14
+# Columns of a face's measures: its normal, h², ℓ, and face-8.
+NORMAL, SQUARE, EXTENT, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 13
 
 
 @kernel
@@ -262,7 +261,6 @@ def measure_face_vertices(
     lengths,
     jumps,
     bends,
-    sharpness,
     rows,
     begin,
     end,
@@ -274,8 +272,8 @@ def measure_face_vertices(
     scaled to length 1 where that is above CLEAR_NORMAL.
 
     Args:
-        lengths, jumps, bends, sharpness: (E,) of the edges: h, x, signed sine, w.
-        measures: (N, 14) out.
+        lengths, jumps, bends: (E,) of the edges: h, x, signed sine.
+        measures: (N, 13) out.
     """
     for i in range(begin, end):
         f, to = rows[i], i - begin
@@ -287,7 +285,7 @@ def measure_face_vertices(
             centre = centre[0] + p[0] / count, centre[1] + p[1] / count, centre[2] + p[2] / count
         mean, area = (0.0, 0.0, 0.0), 0.0
         square, length, shortest, longest = 0.0, 0.0, math.inf, 0.0
-        jump, bend, smooth, least, most = 0.0, 0.0, 0.0, math.inf, -math.inf
+        jump, bend, least, most = 0.0, 0.0, math.inf, -math.inf
         height, lowest, highest = 0.0, math.inf, -math.inf
         for h in range(first, stop):
             after = h + 1 if h + 1 < stop else first
@@ -301,7 +299,6 @@ def measure_face_vertices(
             shortest, longest = min(shortest, lengths[e]), max(longest, lengths[e])
             jump += jumps[e] / count
             bend += bends[e] / count
-            smooth += (1 - sharpness[e]) / count
             least, most = min(least, bends[e]), max(most, bends[e])
             height += umbrella / count
             lowest, highest = min(lowest, umbrella), max(highest, umbrella)
@@ -313,7 +310,7 @@ def measure_face_vertices(
             unevenness += over_plane * over_plane / count
         for k in range(3):
             measures[to, NORMAL + k] = normal[k]
-        measures[to, SQUARE], measures[to, EXTENT], measures[to, SMOOTH] = square, shortest, smooth
+        measures[to, SQUARE], measures[to, EXTENT] = square, shortest
         measures[to, FACE_FEATURES] = jump
         measures[to, FACE_FEATURES + 1] = bend
         measures[to, FACE_FEATURES + 2] = (most + least) / 2

@@ -13,6 +13,7 @@ from train.data.dense_meshes import (
     read_mesh,
     welded,
 )
+from train.data.validation import coarse_mesh, read_shape, validation_meshes
 
 
 def write(path, *shapes):
@@ -101,3 +102,21 @@ def test_a_file_without_triangles_is_refused(tmp_path, content):
     path.write_text(content)
     with pytest.raises(MeshError):
         read_mesh(path)
+
+
+def test_meshes_of_ones_own_validate(tmp_path):
+    """`dense.csv` lists them; parts have the sharp edges that turn enough."""
+    write(tmp_path / "ball.ply", SPHERE)
+    box = trimesh.creation.box().subdivide().subdivide().subdivide().subdivide()
+    write(tmp_path / "box.obj", (box.vertices, box.faces))
+    listed = "file,kind\nball.ply,scan\nbox.obj,part\nabsent.stl,part\n"
+    (tmp_path / "dense.csv").write_text(listed)
+    drawn = validation_meshes(tmp_path)
+    assert {each.path.name for each in drawn} == {"ball.ply", "box.obj"}
+    shapes = {each.path.name: read_shape(each.path, each.kind) for each in drawn}
+    assert shapes["ball.ply"].sharp is None
+    ends = shapes["box.obj"].sharp
+    assert np.isclose(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum(), 12)
+    coarse = coarse_mesh(shapes["ball.ply"], drawn[0])
+    assert coarse is not None
+    assert len(coarse.faces) <= 640

@@ -1,7 +1,7 @@
 """Certificates of schemes that correct at the control mesh and are the base scheme afterwards.
 
-Fold-free, limit distance, smoothness class and resolution independence: docs/theorems.md proves
-them for the scale-free rule and any weights.
+Fold-free, limit distance, smoothness class and resolution independence, of the scale-free rule and
+any weights: docs/explanation/guarantees.md proves them.
 """
 
 import math

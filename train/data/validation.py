@@ -79,9 +79,10 @@ def validation_meshes(
 
 def read_shape(path: Path, kind: str) -> Shape:
     """Return a dense mesh with its sharp edges: the file's own, or those that turn enough."""
-    with np.load(path) as arrays:
-        sharp = arrays["vertices"][arrays["sharp_edges"]] if "sharp_edges" in arrays else None
-    mesh = read_mesh(path)
+    sharp, mesh = None, read_mesh(path)
+    if path.suffix == ".npz":
+        with np.load(path) as arrays:
+            sharp = arrays["vertices"][arrays["sharp_edges"]] if "sharp_edges" in arrays else None
     if sharp is None and kind in SHARP_KINDS:
         sharp = sharp_edges(mesh, SHARP)
     return Shape(path.stem, kind, mesh, None if sharp is None else sharp.astype(np.float64))

@@ -160,24 +160,20 @@ class LearnedLevel:
         length = between[:, 1] - between[:, 0]
         middle = shortened(along[self.edges].mean(dim=1), n["budget"] * dot(length, length))
         w = sharp.edge
-        bends, smooth = self.face_means(self.jumps * (1 - w)), self.face_means(1 - w)
-        smoothed = bends[self.sides].amin(dim=1)
-        opened = torch.where(self.degenerate, 0.0, torch.tanh(n["vertex_gate"] * smoothed))
+        of_faces = self.face_gates((1 - w) * torch.tanh(n["vertex_gate"] * self.jumps))
+        opened = torch.where(self.degenerate, 0.0, of_faces[self.sides].amin(dim=1))
         own = self.at_edges.gate
         gate = (1 - w[self.at_edges.rows]) * (own + (1 - own) * opened)
         edges = self.at_edges.corrected(networks.edge, prior[count : count + len(w)], gate)
         made = [vertices + curved * on_curve, edges + w[:, None] * middle]
         if networks.face is not None:
-            gate = smooth * torch.tanh(n["vertex_gate"] * bends)
-            made += [self.at_faces.corrected(networks.face, prior[count + len(w) :], gate)]
+            made += [self.at_faces.corrected(networks.face, prior[count + len(w) :], of_faces)]
         return torch.cat(made)
 
-    def face_means(self, values: Float[Tensor, " E"]) -> Float[Tensor, " F"]:
-        """Return means over the edges of each face."""
-        sums = values.new_zeros(self.level.topology.face_count).index_add(
-            0, self.corner_faces, values[self.corner_edges]
-        )
-        return sums / torch.bincount(self.corner_faces)
+    def face_gates(self, of_edges: Float[Tensor, " E"]) -> Float[Tensor, " F"]:
+        """Return the largest values over the edges of each face."""
+        none = of_edges.new_zeros(self.level.topology.face_count)
+        return none.scatter_reduce(0, self.corner_faces, of_edges[self.corner_edges], "amax")
 
     def second(self, sharp: Sharpness, first: Float[Tensor, "W 3"]) -> Float[Tensor, "M 3"]:
         """Return x₂ of x₁."""

@@ -1,6 +1,6 @@
 """The recipe: everything that decides a network's trained weights."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 
@@ -169,6 +169,15 @@ def one_step(recipe: Recipe) -> OneStep:
     if not isinstance(recipe.training, OneStep):
         raise ParameterError("recipe", recipe.name, expected="one that trains on one step")
     return recipe.training
+
+
+def of_length(recipe: Recipe, steps: int) -> Recipe:
+    """Return a recipe of so many steps, 1 or more; what happens at a share of them still does."""
+    plan = recipe.training
+    if isinstance(plan, ToLimit):
+        start = plan.start * steps // recipe.steps
+        plan = msgspec.structs.replace(plan, start=start)
+    return replace(recipe, steps=steps, training=plan)
 
 
 def scale_free_parts(recipe: Recipe) -> tuple[ScaleFree, VertexRule]:
