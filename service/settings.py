@@ -9,7 +9,14 @@ from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BeforeValidator, ByteSize, Field, TypeAdapter, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ByteSize,
+    Field,
+    TypeAdapter,
+    model_validator,
+)
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from .options import MAX_LEVELS, Limits
@@ -71,8 +78,16 @@ def _host(text: str) -> str:
     return text.lower()
 
 
+def _store(text: str) -> str:
+    if not text.startswith(("redis://", "rediss://", "unix://")):
+        # Not what it is: it may hold a password.
+        raise ValueError("it is no address of a Redis, such as redis://HOST:6379/0")
+    return text
+
+
 Size = Annotated[ByteSize, BeforeValidator(_whole_size), Field(gt=0, le=_MOST_BYTES)]
 Seconds = Annotated[float, Field(gt=0)]
+Store = Annotated[str, AfterValidator(_store)]
 Name = Annotated[str, BeforeValidator(_not_empty)]
 Place = Annotated[Path, BeforeValidator(_not_empty)]
 Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]
@@ -133,7 +148,8 @@ class Settings(BaseSettings):
     def _refuse_bodies_that_never_fit(self) -> Settings:
         if self.upload_bytes is not None and self.upload_bytes * 3 // 4 < self.body:
             raise ValueError(
-                "upload_bytes must be a third more than body: one client may have three quarters"
+                "PNS_UPLOAD_BYTES must be a third more than PNS_BODY: one client may have three "
+                "quarters of it"
             )
         return self
 
@@ -194,9 +210,8 @@ class Settings(BaseSettings):
     result_folder: Place | None = Field(
         default=None, description="where results are kept; none: the system's temporary folder"
     )
-    store: str | None = Field(
+    store: Store | None = Field(
         default=None,
-        pattern=r"^(rediss?|unix)://",
         description="Redis that replicas share, whichever a client asks for its job; none: each "
         "replica answers for its own",
     )

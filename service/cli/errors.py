@@ -41,7 +41,8 @@ def _explained(error: Exception) -> tuple[str, int] | None:
             return str(error), USAGE_ERROR
         case ValidationError():
             first = error.errors()[0]
-            name = ".".join(str(part) for part in first["loc"])
+            # Of a list that holds a wrong value, the setting.
+            name = str(next(iter(first["loc"]), ""))
             text = first["msg"].removeprefix("Value error, ")
             return f"{PREFIX}{name.upper()}: {text}" if name else text, USAGE_ERROR
         case LimitError(limit=limit) if limit in _SETTING_OF_LIMIT:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
+from ..errors import ServiceError
 from ..settings import Settings
 from ..workers import jobs
 from ..workers.budget import FacesBudget
@@ -29,6 +30,7 @@ from .admission import Admission
 from .jobs import routes as job_routes
 from .jobs import work as job_work
 from .jobs.book import JobBook
+from .jobs.room import Room
 from .jobs.shared import SharedJobs
 from .jobs.store import JobStore
 from .room import with_results_that_fit
@@ -37,6 +39,9 @@ from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
 
 log = logging.getLogger("pns.service")
+
+# How often a service that starts looks whether its workers are ready.
+READY_SECONDS = 0.1
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
@@ -88,7 +93,7 @@ def create_app(
     )
 
     metrics = Metrics()
-    _show(metrics, desk, book)
+    _show(metrics, desk)
     tracer = tracer_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
@@ -105,12 +110,18 @@ def create_app(
         for pool in workers.values():
             pool.start()
         shared = service.shared
-        adopting = shared and asyncio.create_task(shared.adopt_for_ever(service))
+        beside = []
+        if shared is not None:
+            log.info("jobs are shared with other replicas; this one is %s", shared.store.replica)
+            beside.append(asyncio.create_task(shared.adopt_for_ever(service)))
+        if warm_up is None:
+            # Stand-ins load no model.
+            beside.append(asyncio.create_task(_tell_when_ready(service)))
         try:
             yield
         finally:
-            if adopting is not None:
-                adopting.cancel()
+            for task in beside:
+                task.cancel()
             await book.close()
             if shared is not None:
                 await shared.store.close()
@@ -143,17 +154,35 @@ def create_app(
     if settings.store is not None:
         service.shared = SharedJobs(
             JobStore(settings),
+            Room(int(settings.result_bytes), settings.results),
             partial(job_work.job_json, service),
+            partial(job_work.shown, service),
             partial(job_work.begin_shared, service),
         )
-    app.include_router(routes.router(service))
-    app.include_router(job_routes.router(service))
+    metrics.gauge(
+        "pns_result_bytes",
+        "Results that are kept; with a store those of all replicas",
+        lambda: (service.shared or book).bytes,
+    )
+    routers = [routes.router(service), job_routes.router(service), pages.router(settings.prefix)]
+    for router in routers:
+        app.include_router(router)
+    # For the journal: what a layer refuses reaches none of them.
+    app.state.routes = [route for router in routers for route in router.routes]
     app.openapi = openapi.described(app.openapi)  # type: ignore[method-assign]
-    app.include_router(pages.router(settings.prefix))
     return app
 
 
-def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
+async def _tell_when_ready(service: Service) -> None:
+    """Log that the workers are ready, and read the models, which the metrics show."""
+    while not service.desk.ready:
+        await asyncio.sleep(READY_SECONDS)
+    log.info("ready: %d workers have loaded the model", service.settings.workers + 1)
+    with suppress(ServiceError):
+        await service.models.get()
+
+
+def _show(metrics: Metrics, desk: Desk) -> None:
     """Set what the metrics say of jobs."""
     desk.watchers.append(
         lambda job: metrics.job(
@@ -164,7 +193,6 @@ def _show(metrics: Metrics, desk: Desk, book: JobBook) -> None:
     )
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
-    metrics.gauge("pns_result_bytes", "Results that are kept", lambda: book.bytes)
     metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)
 
 

@@ -8,7 +8,9 @@ import os
 import signal
 import socket
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import get_context
 from types import FrameType
 from typing import Any
 
@@ -16,7 +18,9 @@ import uvicorn
 from fastapi import FastAPI
 
 from .. import log_lines
+from ..errors import NoModelError
 from ..settings import Settings, StartError
+from ..workers.jobs import hold_model
 from .admission import Admission
 from .app import create_app
 from .room import BEYOND, connections_that_fit
@@ -26,6 +30,8 @@ log = logging.getLogger("pns.service")
 
 # After draining, what is still in the sockets' buffers may go out.
 FLUSH_SECONDS = 2
+# How long a replica that takes no connection any more takes requests on those that it has.
+LAST_SECONDS = 1.0
 # Connections that wait in the system, and that the event loop takes of them in a turn.
 WAITING, A_TURN = 2048, 32
 # The longest head: request line and headers together.
@@ -111,6 +117,10 @@ class DrainingServer(PromptServer):
     Bodies that have not arrived whole by then are refused: they may never. Until it exits it still
     answers: /readyz and new requests with 503; uvicorn's own shutdown would close the socket at
     once. A second signal, and the deadline, end what is under way with 503.
+
+    With a store other replicas answer for all that this one has, so it takes no connection any
+    more: a proxy that is refused one asks another replica at once. What was on its way is served
+    for a second before anything is refused.
     """
 
     def __init__(
@@ -123,8 +133,9 @@ class DrainingServer(PromptServer):
         metrics.gauge("pns_connections", text, lambda: len(connections))
         self._admission: Admission = app.state.admission
         self._drain_seconds = settings.drain_seconds
+        self._shared = settings.store is not None
         self._beside = beside
-        self._deadline: float | None = None
+        self._began: float | None = None
         self._signals = 0
 
     capture_signals = uvicorn.Server.capture_signals
@@ -155,7 +166,8 @@ class DrainingServer(PromptServer):
             for headers in (self.server_state.default_headers, self.config.encoded_headers):
                 headers.append((b"connection", b"close"))
         self._signals += 1
-        self._admission.draining = True
+        if not self._shared or self._signals > 1:
+            self._admission.draining = True
         # The third is for a shutdown that hangs.
         self.force_exit = self._signals > 2
 
@@ -166,22 +178,41 @@ class DrainingServer(PromptServer):
 
     async def on_tick(self, counter: int) -> bool:
         """Decide, ten times a second, whether to exit."""
-        if self._admission.draining:
+        if self._signals:
             now = asyncio.get_running_loop().time()
-            self._deadline = self._deadline or now + self._drain_seconds
-            self._admission.end_uploads()
-            if self._signals > 1 or now >= self._deadline:
-                self._admission.end()
-                self.should_exit = True
-            if self._admission.admitted == 0:
-                self.should_exit = True
+            if self._began is None:
+                self._began = now
+                self._begin_to_drain()
+            late = now - self._began
+            if self._shared and late >= LAST_SECONDS:
+                self._admission.draining = True
+            if self._admission.draining:
+                self._admission.end_uploads()
+                if self._signals > 1 or late >= self._drain_seconds:
+                    self._admission.end()
+                    self.should_exit = True
+                if self._admission.admitted == 0:
+                    self.should_exit = True
         return await super().on_tick(counter)
+
+    def _begin_to_drain(self) -> None:
+        log.info("draining: %d requests and jobs are under way", self._admission.admitted)
+        if not self._shared:
+            return
+        for server in self.servers:
+            server.close()
+        for connection in tuple(self.server_state.connections):
+            cycle: Any = getattr(connection, "cycle", None)
+            if cycle is not None and cycle.response_complete:
+                # What is still to be sent is sent.
+                connection.transport.close()
 
 
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
     # Uvicorn says between its log lines alone that a port is taken.
     with _listening(settings.host, settings.port, "give another --host or --port"):
+        check_model(settings)
         log_lines.configure()
         app = create_app(settings)
         server = DrainingServer(app, settings, metrics_server(app.state.metrics, settings))
@@ -189,6 +220,18 @@ def serve(settings: Settings) -> None:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
     server.run()
+
+
+def check_model(settings: Settings) -> None:
+    """Load the served model where one is named. Raises StartError where it does not load."""
+    if settings.model is None:
+        return
+    # This process is to load none.
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        try:
+            pool.submit(hold_model, settings.model, settings.providers).result()
+        except NoModelError as error:
+            raise StartError(f"PNS_MODEL (or --model): {error.detail}") from error
 
 
 def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket:

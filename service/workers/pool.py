@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import multiprocessing
+import signal
 import time
 from collections import Counter
 from collections.abc import Callable, Coroutine, Sequence
@@ -302,10 +303,20 @@ async def _result(pool: ProcessPool, future: asyncio.Future[T], must_end: float)
     if not (future.done() or silent):
         raise JobTimeout("the job took longer than a job may")
     if not future.done() or _lost(future):
+        _log_end(future)
         raise WorkerDied(
             "the worker process ended before it answered; it may have run out of memory"
         )
     return future.result()
+
+
+def _log_end(future: asyncio.Future[T]) -> None:
+    """Log which process ended, and how, where its pool has told it."""
+    error = future.exception() if future.done() and not future.cancelled() else None
+    if isinstance(error, ProcessExpired) and error.exitcode is not None:
+        code = int(error.exitcode)
+        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        log.warning("worker process %s ended: %s", error.pid, how)
 
 
 def _reason(error: BaseException) -> BaseException:

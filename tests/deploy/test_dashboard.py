@@ -76,3 +76,15 @@ def test_every_series_of_ours_is_on_the_dashboard_or_a_part_of_one(served):
     ours = {name for name in served if name.startswith("pns_")}
     bases = {re.sub(r"_(bucket|sum|count|created|total)$", "", name) for name in ours}
     assert {base for base in bases if base not in text} == set()
+
+
+def test_every_series_of_ours_is_in_the_reference_and_none_that_is_not(served):
+    page = Path(__file__).resolve().parents[2] / "docs" / "reference" / "metrics.md"
+    told = set(re.findall(r"`(pns_[a-z_]+)`", page.read_text()))
+    ours = {name for name in served if name.startswith("pns_")}
+    assert told == {re.sub(r"_(bucket|sum|count|created)$", "", name) for name in ours} - {
+        # The library's own, beside each counter.
+        name.removesuffix("_total")
+        for name in told
+        if name.endswith("_total")
+    }

@@ -11,7 +11,7 @@ from contextlib import ExitStack, closing, suppress
 import pytest
 
 from tests.support.live import served
-from tests.support.proxy import proxied
+from tests.support.proxy import free_port, proxied
 
 GLB = {"Content-Type": "model/gltf-binary"}
 
@@ -82,7 +82,12 @@ def test_a_body_over_the_limit_ends_at_the_proxy(proxy):
         connection.putrequest("POST", "/subdivide")
         connection.putheader("Content-Length", str(65 * 2**20))
         connection.endheaders()
-        assert connection.getresponse().status == 413
+        answer = connection.getresponse()
+        assert answer.status == 413
+        # As the service would say it.
+        assert answer.headers["content-type"] == "application/problem+json"
+        problem = json.loads(answer.read())
+        assert (problem["status"], problem["code"]) == (413, "limit-exceeded")
     told = [line["route"] for line in heard(address, lines)]
     assert "/subdivide" not in told
 
@@ -162,14 +167,14 @@ def test_an_answer_before_the_body_is_whole_reaches_its_client(proxy, query):
     assert json.loads(text)["status"] == answer.status
 
 
-def beginning(connection):
+def beginning(connection, size):
     try:
-        return connection.recv(4096)[:12]
+        return connection.recv(4096)[:size]
     except ConnectionResetError:
         return b""
 
 
-def answers(address, requests):
+def answers(address, requests, size=12):
     """Return how answers begin to requests that are all open at once, the last one first."""
     with ExitStack() as stack:
         held = [
@@ -177,13 +182,15 @@ def answers(address, requests):
         ]
         for connection, request in zip(held, requests, strict=True):
             connection.sendall(request.encode())
-        return [beginning(connection) for connection in reversed(held)]
+        return [beginning(connection, size) for connection in reversed(held)]
 
 
 def test_one_address_has_so_many_connections_and_no_more(proxy):
     address, _, _ = proxy
     upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
-    assert b"HTTP/1.1 429" in answers(address, [upload] * 40)
+    said = answers(address, [upload] * 40, size=4096)
+    (refused, *_) = (answer for answer in said if answer.startswith(b"HTTP/1.1 429"))
+    assert json.loads(refused.partition(b"\r\n\r\n")[2])["code"] == "too-many-requests"
 
 
 def test_a_subscribers_ipv6_addresses_are_one(proxy):
@@ -194,6 +201,16 @@ def test_a_subscribers_ipv6_addresses_are_one(proxy):
     assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
     answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:0:2::1"})
     assert answer.status == 200
+
+
+def test_without_a_service_the_proxy_says_so(tmp_path):
+    with proxied(("127.0.0.1", free_port()), tmp_path) as address:
+        answer, text = ask(address, "GET", "/limits", headers={"X-Request-ID": "mine"})
+    assert (answer.status, answer.headers["content-type"]) == (502, "application/problem+json")
+    assert int(answer.headers["retry-after"]) >= 1
+    problem = json.loads(text)
+    assert (problem["status"], problem["code"]) == (502, "no-service")
+    assert problem["request_id"] == "mine"
 
 
 def test_the_proxys_logs_say_nothing_of_paths(proxy):

@@ -33,16 +33,19 @@ def nginx() -> str:
 
 @contextmanager
 def proxied(
-    behind: Address, folder: Path, *, seconds: int = 1, rate: int = 20
+    behind: Address, folder: Path, *others: Address, seconds: int = 1, rate: int = 20
 ) -> Iterator[Address]:
     """The address of a proxy in front of a service, with all that it writes in a folder.
+
+    `others` are further replicas of the service.
 
     A client may say which address it has, in X-Client. The times are `seconds` where 10 are
     deployed, and an address may ask `rate` times a second where 20 are.
     """
     program, port = nginx(), free_port()
     text = CONFIGURATION.read_text()
-    text = text.replace("service:8000", f"{behind[0]}:{behind[1]}")
+    servers = [f"server {host}:{port_behind};" for host, port_behind in (behind, *others)]
+    text = text.replace("server service:8000;", " ".join(servers))
     text = text.replace("rate=20r/s", f"rate={rate}r/s")
     text = text.replace("listen 8080", f"listen 127.0.0.1:{port}").replace("/tmp/", f"{folder}/")
     text = text.replace("/dev/stdout", str(folder / "access.log"))

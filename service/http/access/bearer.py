@@ -52,6 +52,8 @@ class Bearer:
         self._keys = Keyring(keys)
         # Of keys that were right, by their plain hash: scrypt is run once for each.
         self._known: dict[bytes, Entry] = {}
+        # Of keys that are being checked, whoever waits for that.
+        self._checks: dict[bytes, asyncio.Task[Entry]] = {}
         self._one = asyncio.Semaphore(1)
         self._waiting: Counter[str] = Counter()
         # By network and by the name in the key.
@@ -86,21 +88,32 @@ class Bearer:
         plain = hashlib.sha256(key.encode()).digest()
         if plain in self._known:
             return self._known[plain]
-        networks = sites(scope["client"][0] if scope.get("client") else "")
-        self._check_patience(networks, name)
-        self._waiting[networks[0]] += 1
-        try:
-            async with self._one:
-                entry = await asyncio.to_thread(self._keys.find, key, name)
-            if entry is None:
-                self._wrong.update((network, name) for network in networks)
-                if self._wrong_of(networks[0]) > WRONG_A_MINUTE:
-                    # Names without end are guessed slowly.
-                    await asyncio.sleep(PAUSE_SECONDS)
-                raise UnauthorizedError("the key is not known")
-        finally:
-            self._waiting -= Counter({networks[0]: 1})
-        self._known[plain] = entry
+        check = self._checks.get(plain)
+        if check is None:
+            networks = sites(scope["client"][0] if scope.get("client") else "")
+            self._check_patience(networks, name)
+            self._waiting[networks[0]] += 1
+            check = self._checks[plain] = asyncio.create_task(self._checked(key, name, networks))
+
+            def end(ended: asyncio.Task[Entry]) -> None:
+                del self._checks[plain]
+                self._waiting -= Counter({networks[0]: 1})
+                if not ended.cancelled() and ended.exception() is None:
+                    self._known[plain] = ended.result()
+
+            check.add_done_callback(end)
+        # Who leaves ends it for nobody else.
+        return await asyncio.shield(check)
+
+    async def _checked(self, key: str, name: str, networks: tuple[str, ...]) -> Entry:
+        async with self._one:
+            entry = await asyncio.to_thread(self._keys.find, key, name)
+        if entry is None:
+            self._wrong.update((network, name) for network in networks)
+            if self._wrong_of(networks[0]) > WRONG_A_MINUTE:
+                # Names without end are guessed slowly.
+                await asyncio.sleep(PAUSE_SECONDS)
+            raise UnauthorizedError("the key is not known")
         return entry
 
     def _check_patience(self, networks: tuple[str, ...], name: str) -> None:

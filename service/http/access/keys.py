@@ -83,28 +83,32 @@ class Keyring:
 
 def read_keys(path: Path) -> dict[str, Entry]:
     """Read the entries of a file, by name. Raises KeysError."""
+    said = f"PNS_KEYS_FILE: {path}"
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         entries = _ENTRIES.validate_python(data.get("key", []))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         text = error.strerror if isinstance(error, OSError) else error
-        raise KeysError(f"PNS_KEYS_FILE: {path}: {text}") from error
+        raise KeysError(f"{said}: {text}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise KeysError(f"{path}: key.{where}: {first['msg']}") from error
+        number, *fields = first["loc"] or ("",)
+        if not fields:
+            raise KeysError(f"{said}: entries are [[key]] tables with name and hash") from error
+        where = ".".join(map(str, fields))
+        raise KeysError(f"{said}: entry {int(number) + 1}: {where}: {first['msg']}") from error
     if unknown := sorted(set(data) - {"key"}):
-        raise KeysError(f"{path}: {unknown[0]} is not known; entries are [[key]] tables")
+        raise KeysError(f"{said}: {unknown[0]} is not known; entries are [[key]] tables")
     by_name = {entry.name: entry for entry in entries}
     if len(by_name) < len(entries):
-        raise KeysError(f"{path}: two entries have one name")
+        raise KeysError(f"{said}: two entries have one name")
     if not entries:
-        raise KeysError(f"{path}: there is no [[key]] in it, so nobody could ask for anything")
+        raise KeysError(f"{said}: there is no [[key]] in it, so nobody could ask for anything")
     for entry in entries:
         try:
             matches("", entry.hash)
         except (ValueError, MemoryError) as error:
-            raise KeysError(f"{path}: {entry.name}: the hash asks for too much: {error}") from error
+            raise KeysError(f"{said}: {entry.name}: the hash asks for too much: {error}") from error
     return by_name
 
 

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ...errors import BusyError, ServiceError
 from ...workers.job import Job, State
-
-# Shares of the room for results whose promised time is not over: of a client (in IPv6 a /64), and
-# of a /56 and a /48 that it is in.
-SHARES = (0.5, 0.625, 0.75)
+from .room import Kept, Room
 
 
 class NoSuchJobError(ServiceError):
@@ -55,15 +50,6 @@ class Entry:
     adopted: bool = False
     cancelled: bool = False
 
-    @property
-    def is_promised(self) -> bool:
-        """True while its result must stay: not fetched yet, and its least time is not over."""
-        return (
-            self.job.state is State.DONE
-            and not self.job.fetched.is_set()
-            and time.monotonic() < self.promised_until
-        )
-
 
 class JobBook:
     """Keeps jobs for `seconds` after their end, at most `max_jobs`, their results in `max_bytes`.
@@ -79,8 +65,7 @@ class JobBook:
     ) -> None:
         self._seconds = seconds
         self._promised_seconds = promised_seconds
-        self._max_bytes = max_bytes
-        self._max_jobs = max_jobs
+        self._room = Room(max_bytes, max_jobs)
         self._entries: dict[str, Entry] = {}
         # Those that have ended, in that order.
         self._ended: dict[str, Entry] = {}
@@ -97,7 +82,7 @@ class JobBook:
 
     def check_room(self, networks: tuple[str, ...]) -> None:
         """Raise BusyError where a result of this client would find no place now."""
-        self._check_share(networks, 0)
+        self._room.check(self._kept().values(), networks)
 
     def add(self, job: Job, owner: str | None, networks: tuple[str, ...] = ()) -> Entry:
         """Write a job down."""
@@ -126,7 +111,8 @@ class JobBook:
             return
         size = sum(file.size for file in job.results) if job.state is State.DONE else 0
         try:
-            self._make_room(entry.networks, size)
+            for name in self._room.leaving(self._kept(), entry.networks, size):
+                self.forget(name)
         except BusyError as error:
             job.state, job.error, size = State.FAILED, error, 0
         if job.state is not State.DONE:
@@ -160,55 +146,15 @@ class JobBook:
             self.forget(job_id)
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _make_room(self, networks: tuple[str, ...], size: int) -> None:
-        """Strike out what may go, for a result of so many bytes. Raises BusyError."""
-        if size:
-            self._check_share(networks, size)
-        while self._ended:
-            too_large = self.bytes + size > self._max_bytes
-            if not too_large and len(self._ended) < self._max_jobs:
-                return
-            self.forget(self._next_to_go(by_size=too_large).job.id)
-
-    def _next_to_go(self, *, by_size: bool) -> Entry:
-        """Choose the job to strike out. Raises BusyError."""
-        free = [entry for entry in self._ended.values() if not entry.is_promised]
-        if not free:
-            raise BusyError("results that wait to be fetched leave no room", retry_after=60)
-        jobs, sizes = _held(self._ended.values())
-
-        def rank(entry: Entry) -> tuple[bool, bool, int, int]:
-            useful = entry.job.state is State.DONE
-            client = entry.networks[0]
-            most, least = (sizes[client], 0) if by_size else (jobs[client], entry.size or 0)
-            return not useful, entry.job.fetched.is_set(), most, -least
-
-        # The first of equals is the oldest.
-        return max(free, key=rank)
-
-    def _check_share(self, networks: tuple[str, ...], size: int) -> None:
-        """Raise BusyError where promised results leave no room, or these networks no share."""
-        promised = [entry for entry in self._ended.values() if entry.is_promised]
-        jobs, sizes = _held(promised)
-        for network, share in zip(networks, SHARES, strict=False):
-            many = jobs[network] + 1 > max(1, self._max_jobs * share)
-            # The first result of a client is never an unfair share.
-            large = sizes[network] and sizes[network] + size > self._max_bytes * share
-            if many or large:
-                raise BusyError("results of this client that wait leave no room", retry_after=60)
-        full = sum(entry.size or 0 for entry in promised) + size > self._max_bytes
-        if full or len(promised) >= self._max_jobs:
-            raise BusyError("results that wait to be fetched leave no room", retry_after=60)
-
-
-def _held(entries: Iterable[Entry]) -> tuple[Counter[str], Counter[str]]:
-    """Count jobs and bytes by network."""
-    jobs: Counter[str] = Counter()
-    sizes: Counter[str] = Counter()
-    for entry in entries:
-        jobs.update(entry.networks)
-        sizes.update(dict.fromkeys(entry.networks, entry.size or 0))
-    return jobs, sizes
+    def _kept(self) -> dict[str, Kept]:
+        """Return those that have ended, the oldest first."""
+        now = time.monotonic()
+        kept = {}
+        for name, entry in self._ended.items():
+            done, fetched = entry.job.state is State.DONE, entry.job.fetched.is_set()
+            promised = done and not fetched and now < entry.promised_until
+            kept[name] = Kept(entry.networks, entry.size or 0, done, fetched, promised)
+        return kept
 
 
 def _release(job: Job) -> None:

@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator
 from contextlib import suppress
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -21,7 +22,7 @@ from ..parameters import Parameters
 from ..service import Service
 from .book import NotDoneError
 from .store import ANSWER, REPORT
-from .work import hand_in, job_json
+from .work import hand_in, shown
 
 # How often the page of a running job is looked at, and how long a stream may be silent.
 LOOK_SECONDS = 0.25
@@ -37,7 +38,7 @@ def router(service: Service) -> APIRouter:
         entry = await hand_in(service, request, parameters)
         # Relative to /jobs, so that it holds under any root path.
         headers = {"Location": f"{request.scope.get('root_path', '')}/jobs/{entry.job.id}"}
-        return JSONResponse(job_json(service, entry.job), 202, headers=headers)
+        return JSONResponse(shown(service, entry.job), 202, headers=headers)
 
     @routes.get("/jobs/{job_id}", **documentation.JOB)
     async def read_job(request: Request, job_id: str) -> Response:
@@ -98,7 +99,7 @@ async def _events(service: Service, client: str, job_id: str) -> AsyncIterator[s
             return
         with suppress(TimeoutError):
             async with asyncio.timeout(LOOK_SECONDS):
-                if service.book.has(job_id):
+                if service.shared is None and service.book.has(job_id):
                     await service.book.find(job_id, client).job.ended.wait()
                 else:
                     await asyncio.sleep(LOOK_SECONDS)
@@ -108,7 +109,7 @@ async def _events(service: Service, client: str, job_id: str) -> AsyncIterator[s
 async def _view(service: Service, client: str, job_id: str) -> dict[str, Any]:
     """Return a job as its client sees it, whichever replica works on it. Raises ServiceError."""
     if service.shared is None or service.book.has(job_id):
-        return job_json(service, service.book.find(job_id, client).job)
+        return shown(service, service.book.find(job_id, client).job)
     return (await service.shared.find(job_id, client)).view
 
 
@@ -145,6 +146,7 @@ async def _result(
     sent, timing = (lambda: None), {}
     if service.shared is not None and not service.book.has(job_id):
         file = await service.shared.file(REPORT if kind == media.JSON else ANSWER, job_id)
+        sent = partial(service.shared.fetched, job_id) if kind != media.JSON else sent
     else:
         job = service.book.find(job_id, client).job
         answer, report = job.results

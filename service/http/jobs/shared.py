@@ -17,6 +17,7 @@ from .. import problems
 from ..intake import Wanted, made_of
 from ..room import result_folder
 from .book import Entry, NoSuchJobError
+from .room import Kept, Room
 from .store import (
     ANSWER,
     BEAT_SECONDS,
@@ -24,6 +25,7 @@ from .store import (
     LEASE_SECONDS,
     REPORT,
     JobStore,
+    Lease,
     Record,
     StoreError,
 )
@@ -39,60 +41,119 @@ View = Callable[[Job], dict[str, Any]]
 log = logging.getLogger("pns.service")
 
 
+# How long to wait before the end of a job is told again to a store that did not answer. After that
+# the job is left to whichever replica finds the store first.
+AGAIN_SECONDS = (1.0, 2.0, 4.0, 8.0)
+
+
 class SharedJobs:
     """Jobs of all replicas, as one of them sees them.
 
-    `begin` is called to work on a job that another replica has left: it is in the book, and what
-    it holds is given back when its work ends.
+    `view` shows a job as it is, `shown` as clients see it while its end is not stored. `begin` is
+    called to work on a job that another replica has left: it is in the book, and what it holds is
+    given back when its work ends.
     """
 
     def __init__(
-        self, store: JobStore, view: View, begin: Callable[[Entry, AsyncExitStack], None]
+        self,
+        store: JobStore,
+        room: Room,
+        view: View,
+        shown: View,
+        begin: Callable[[Entry, AsyncExitStack], None],
     ) -> None:
         self.store = store
+        self.bytes = 0
+        """Bytes of all replicas' results, as they were last counted."""
+        self._room = room
         self._view = view
+        self._shown = shown
         self._begin = begin
+        self._notes: set[asyncio.Task[None]] = set()
+
+    async def check_room(self, networks: tuple[str, ...]) -> None:
+        """Raise BusyError where a result of this client would find no place now, StoreError."""
+        self._room.check((await self._kept()).values(), networks)
+
+    async def _kept(self) -> dict[str, Kept]:
+        kept = await self.store.kept()
+        self.bytes = sum(one.size for one in kept.values())
+        return kept
 
     async def publish(self, job: Job, owner: str | None) -> None:
-        """Make a job known to other replicas, with its body. Raises StoreError."""
-        body = b"".join(job.body.pieces())
+        """Make a job known to other replicas, with its body. Raises StoreError, StoreFullError."""
         asked = {name: getattr(job.work, name) for name in ASKED}
         asked |= {"client": job.client, "options": asdict(job.work.options)}
-        await self.store.create(job.id, owner, asked, self._view(job), body)
+        await self.store.create(job.id, owner, asked, self._view(job), job.body.pieces())
 
     async def beat(self, entry: Entry) -> None:
-        """Keep a job leased while it is worked on; cancel it where its client wants that."""
+        """Keep a job leased until its end is stored; end it where its client wants that."""
         while True:
             await asyncio.sleep(BEAT_SECONDS)
             # The lease outlasts a store that is away for a moment.
             with suppress(StoreError):
-                if not await self.store.beat(entry.job.id, self._view(entry.job)):
-                    entry.cancelled = True
-                    if entry.task is not None:
-                        entry.task.cancel()
-                    return
+                lease = await self.store.beat(entry.job.id, self._shown(entry.job))
+                if lease is Lease.HELD:
+                    continue
+                entry.cancelled = lease is Lease.CANCELLED
+                if entry.task is not None:
+                    entry.task.cancel()
+                return
 
-    async def end(self, entry: Entry) -> bool:
+    async def end(self, entry: Entry) -> None:
         """Keep the end of a job for all replicas; leave one that only this replica has ended.
 
-        Returns whether the store has it.
+        A job whose result finds no room has failed.
         """
         job = entry.job
         busy = isinstance(job.error, BusyError) and not isinstance(job.error, WorkerDied)
         left = job.state is State.CANCELLED and not entry.cancelled
-        try:
-            if left or (busy and entry.adopted):
+        if left or (busy and entry.adopted):
+            # Without its word the lease ends a little later.
+            with suppress(StoreError):
                 await self.store.release(job.id)
-                return True
-            results = {}
-            if job.state is State.DONE:
-                for name, file in ((ANSWER, job.answer), (REPORT, job.report)):
-                    results[name] = b"" if file is None else b"".join(file.pieces())
-            await self.store.finish(job.id, self._view(job), results)
-        except StoreError as error:
-            log.warning("the end of a job is not shared: %s", error)
-            return False
-        return True
+            return
+        for seconds in (*AGAIN_SECONDS, None):
+            try:
+                await self._keep(entry)
+            except StoreError as error:
+                log.warning("the end of a job is not stored yet: %s", error)
+            else:
+                return
+            if seconds is not None:
+                await asyncio.sleep(seconds)
+        log.error("a job is left to the replica that finds the store first")
+
+    async def _keep(self, entry: Entry) -> None:
+        """Store the end of a job. Raises StoreError."""
+        job = entry.job
+        files = (job.answer, job.report) if job.state is State.DONE else (None, None)
+        sizes = [0 if file is None else file.size for file in files]
+        try:
+            for name in self._room.leaving(await self._kept(), entry.networks, sum(sizes)):
+                await self.store.delete(name)
+            results = {
+                name: file.pieces()
+                for name, file in zip((ANSWER, REPORT), files, strict=True)
+                if file is not None
+            }
+            await self.store.finish(job.id, self._view(job), results, entry.networks)
+        except StoreError:
+            raise
+        except BusyError as error:
+            job.state, job.error = State.FAILED, error
+            await self.store.finish(job.id, self._view(job), {}, entry.networks)
+
+    def fetched(self, job_id: str) -> None:
+        """Note that somebody has the result of a job."""
+
+        async def note() -> None:
+            with suppress(BusyError):
+                await self.store.fetched(job_id)
+
+        task = asyncio.create_task(note())
+        self._notes.add(task)
+        task.add_done_callback(self._notes.discard)
 
     async def find(self, job_id: str, client: str) -> Record:
         """Return the record of a job that this client may see.
@@ -106,13 +167,11 @@ class SharedJobs:
         return record
 
     async def file(self, name: str, job_id: str) -> MemoryFile:
-        """Return a result, in memory. Raises NoSuchJobError, StoreError, NoStorageError."""
-        content = await self.store.file(name, job_id)
-        if content is None:
-            raise NoSuchJobError("no job has this id, or its result is no longer kept")
+        """Return a file of a job, in memory. Raises NoSuchJobError, StoreError, NoStorageError."""
         with ExitStack() as held:
             file = held.enter_context(MemoryFile())
-            file.append(content)
+            if not await self.store.file(name, job_id, file):
+                raise NoSuchJobError("no job has this id, or its result is no longer kept")
             held.pop_all()
         return file
 
@@ -121,6 +180,7 @@ class SharedJobs:
         while True:
             await asyncio.sleep(LEASE_SECONDS / 4)
             try:
+                await self._kept()
                 while not service.admission.draining and await self._adopt(service):
                     pass
             except StoreError as error:
@@ -135,31 +195,34 @@ class SharedJobs:
     async def _adopt(self, service: Service) -> bool:
         """Take one job, where there is one and room for it. Raises StoreError, BusyError."""
         service.desk.turns.check_room("")
-        record = await self.store.take_orphan()
+        record = await self.store.take_orphan(service.book.has)
         if record is None:
             return False
-        content = await self.store.file(BODY, record.id)
-        if content is None:
-            await self._fail(record, StoreError("the file is no longer kept: send it again"))
-            return True
+        log.warning(
+            "a job is taken from replica %s, whose lease on it has ended",
+            record.replica,
+            extra={"request_id": record.asked["request_id"]},
+        )
         settings = service.settings
-        options = Options(**record.asked["options"])
-        asked: dict[str, Any] = record.asked | {"options": options}
         patience = settings.queue_seconds + settings.job_seconds
+        wanted = Wanted(True, True, result_folder(settings), patience)
         async with AsyncExitStack() as held:
-            counted = held.enter_context(service.admission.body(asked["client"]))
-            counted.grow(len(content))
-            wanted = Wanted(True, True, result_folder(settings), patience)
+            counted = held.enter_context(service.admission.body(record.asked["client"]))
             with ExitStack() as files:
                 body = files.enter_context(MemoryFile())
-                body.append(content)
+                if not await self.store.file(BODY, record.id, body):
+                    error = StoreError("the file is no longer kept: send it again")
+                    await self._fail(record, error)
+                    return True
+                counted.grow(body.size)
+                options = Options(**record.asked["options"])
+                asked: dict[str, Any] = record.asked | {"options": options}
                 job = made_of(settings, body, wanted, **asked)
                 files.pop_all()
             held.callback(job.close)
             job.id = record.id
             entry = service.book.add(job, record.owner)
             entry.adopted = True
-            log.info("a job is taken from a replica that has died")
             self._begin(entry, held.pop_all())
         return True
 
@@ -167,4 +230,5 @@ class SharedJobs:
         """End a job that no replica can do. Raises StoreError."""
         problem = problems.of_job_view(error, record.asked["request_id"])
         end = {"state": str(State.FAILED), "queue_place": None, "stage": None, "problem": problem}
-        await self.store.finish(record.id, record.view | end, {})
+        networks = (record.asked["client"],)
+        await self.store.finish(record.id, record.view | end, {}, networks)

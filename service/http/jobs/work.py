@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack, suppress
 from typing import Any
@@ -47,6 +48,17 @@ def job_json(service: Service, job: Job) -> dict[str, Any]:
     }
 
 
+def shown(service: Service, job: Job) -> dict[str, Any]:
+    """Return a job as clients see it here.
+
+    One that replicas share runs until its end is stored: what one shows, each of them shows.
+    """
+    view = job_json(service, job)
+    if service.shared is not None and job.state.ended:
+        view |= {"state": str(State.RUNNING), "problem": None}
+    return view
+
+
 async def hand_in(service: Service, request: Request, parameters: Parameters) -> Entry:
     """Take a file in, and its job until it stands in line.
 
@@ -61,7 +73,10 @@ async def hand_in(service: Service, request: Request, parameters: Parameters) ->
         patience=settings.queue_seconds + settings.job_seconds,
     )
     client = client_of(request, settings)
-    service.book.check_room(client.networks)
+    if service.shared is None:
+        service.book.check_room(client.networks)
+    else:
+        await service.shared.check_room(client.networks)
     async with AsyncExitStack() as held:
         job = await held.enter_async_context(taken_in(service, request, parameters, wanted))
         # Of whoever has no key, everybody who knows a job's id may see it.
@@ -99,25 +114,24 @@ async def _work(service: Service, entry: Entry, held: AsyncExitStack) -> None:
     """Do a job that no connection waits for, to its end, and be under way until it is fetched."""
     job, shared = entry.job, service.shared
     async with held:
-        beats = None if shared is None else asyncio.create_task(shared.beat(entry))
+        beats = shared and asyncio.create_task(shared.beat(entry))
         try:
             async with service.admission.working():
                 await service.desk.serve(job)
-        except DrainingError:
+        except ServiceError:
             pass
-        except ServiceError as error:
-            log.info("a job failed: %s", error.code)
         except JobFaultError as error:
             # The traceback that matters is the worker's.
             log.error("a job failed in its worker:\n%s", error)  # noqa: TRY400
         finally:
+            size = sum(file.size for file in job.results)
+            if shared is None:
+                service.book.keep(job)
+            else:
+                await _to_its_end(_stored(service, entry))
             if beats is not None:
                 beats.cancel()
-            # Of jobs that are shared any replica has the result, from the store.
-            if shared is not None and await _to_its_end(shared.end(entry)):
-                service.book.hand_over(job)
-            else:
-                service.book.keep(job)
+            log.info("a job has ended", extra=_told(job, size))
     if job.state is State.DONE and shared is None:
         # Who asks now and then whether it is done may not have asked since.
         with suppress(TimeoutError, DrainingError):
@@ -125,8 +139,31 @@ async def _work(service: Service, entry: Entry, held: AsyncExitStack) -> None:
                 await job.fetched.wait()
 
 
-async def _to_its_end(work: Coroutine[Any, Any, bool]) -> bool:
-    """Wait for a short piece of work, also in a task that is being cancelled."""
+async def _stored(service: Service, entry: Entry) -> None:
+    """Have the end of a job stored: then any replica has it, and this one lets go of it."""
+    try:
+        if service.shared is not None:
+            await service.shared.end(entry)
+    finally:
+        service.book.hand_over(entry.job)
+
+
+async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
+    """Wait for a piece of work, also in a task that is being cancelled."""
     task = asyncio.create_task(work)
-    await asyncio.wait({task})
-    return task.result()
+    while not task.done():
+        with suppress(asyncio.CancelledError):
+            await asyncio.wait({task})
+    task.result()
+
+
+def _told(job: Job, size: int) -> dict[str, Any]:
+    """Return what the log says of a job that has ended, under the id of its request."""
+    fields = {
+        "state": str(job.state),
+        "client": job.client,
+        "seconds": round(time.monotonic() - job.admitted, 3),
+        "bytes": size,
+        "code": getattr(job.error, "code", ""),
+    }
+    return {"fields": fields, "request_id": job.work.request_id}

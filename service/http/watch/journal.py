@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...log_lines import HEADER, REQUEST_ID, id_of
@@ -93,7 +94,7 @@ class Journal:
                 Entry(
                     id=name,
                     method=scope["method"] if scope["method"] in METHODS else "other",
-                    route=getattr(scope.get("route"), "path", None) or "none",
+                    route=_route(scope),
                     status=status if whole or status >= 400 else GONE,
                     code=state.get("problem", ""),
                     client=_client(scope),
@@ -111,6 +112,15 @@ class Journal:
         log.info("request", extra={"fields": fields, "request_id": name})
         for listener in self.listeners:
             listener(entry)
+
+
+def _route(scope: Scope) -> str:
+    """Return the pattern of the route that was asked, also where a layer refused the request."""
+    route = scope.get("route")
+    if route is None and "app" in scope:
+        routes = getattr(scope["app"].state, "routes", ())
+        route = next((one for one in routes if one.matches(scope)[0] is not Match.NONE), None)
+    return getattr(route, "path", None) or "none"
 
 
 def _client(scope: Scope) -> str:

@@ -192,6 +192,26 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
     assert "none.toml" in err
 
 
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"PNS_MODEL": "nope"}, "PNS_MODEL (or --model): model nope: "),
+        ({"PNS_STORE": "localhost:6379"}, "PNS_STORE: it is no address of a Redis, such as redis:"),
+        ({"PNS_HOSTS": "pns.example,a b"}, "PNS_HOSTS: 'a b' is no host name"),
+        ({"PNS_UPLOAD_BYTES": "64MiB"}, "PNS_UPLOAD_BYTES must be a third more than PNS_BODY"),
+    ],
+)
+def test_a_setting_that_cannot_be_used_ends_it_by_name(
+    pns: Any, monkeypatch: pytest.MonkeyPatch, settings: dict[str, str], said: str
+) -> None:
+    for name, value in settings.items():
+        monkeypatch.setenv(name, value)
+    code, _, err = pns("serve", "--port", "0")
+    assert code != 0
+    assert err.startswith(f"pns: {said}")
+    assert len(err.splitlines()) == 1
+
+
 def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -117,8 +117,8 @@ def test_a_name_is_plain(name):
     ("text", "reason"),
     [
         ("", "there is no"),
-        ("key = 1", "key"),
-        ("[[key]]\nname = 'a'\nhash = 'plain'", "hash"),
+        ("key = 1", "entries are .*key"),
+        ("[[key]]\nname = 'a'\nhash = 'plain'", "PNS_KEYS_FILE: .* entry 1: hash"),
         ("[[key]]\nname = 'A'\nhash = 'plain'", "name"),
         ("[[keys]]\nname = 'a'", "keys is not known"),
         ("ENTRY\ncolour = 1", "colour"),
@@ -297,6 +297,42 @@ def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeyp
     monkeypatch.setattr(bearer_layer, "Keyring", Slow)
     layer = Bearer(PlainTextResponse("never"), {})
     asyncio.run(scenario())
+
+
+def test_a_first_burst_with_one_key_waits_for_its_one_check(monkeypatch):
+    checks, let_go = [], threading.Event()
+
+    class Slow(Keyring):
+        def find(self, key, name):
+            checks.append(name)
+            assert let_go.wait(600)
+            return super().find(key, name)
+
+    async def status(layer):
+        said = []
+
+        async def send(message):
+            said.append(message.get("status"))
+
+        headers = [(b"authorization", f"Bearer {KEY}".encode())]
+        scope = {"type": "http", "headers": headers, "path": "/jobs", "client": ("192.0.2.1", 1)}
+        await layer(scope, None, send)
+        return said[0]
+
+    async def scenario():
+        layer = Bearer(PlainTextResponse("served"), {"studio": entry})
+        burst = [asyncio.create_task(status(layer)) for _ in range(200)]
+        await asyncio.sleep(0.05)
+        # Who leaves ends the check for nobody else.
+        burst.pop(0).cancel()
+        let_go.set()
+        assert await asyncio.gather(*burst) == [200] * 199
+        assert await status(layer) == 200
+
+    entry = Entry(name="studio", hash=hashed_by(KEY, 4))
+    monkeypatch.setattr(bearer_layer, "Keyring", Slow)
+    asyncio.run(scenario())
+    assert checks == ["studio"]
 
 
 def hashed_by(key, log_n):

@@ -251,6 +251,24 @@ def test_requests_are_counted_by_route_status_and_code(client, scrape):
     assert labelled(values, "pns_worker_memory_bytes") > 2**20
 
 
+def test_what_a_layer_refuses_is_counted_under_its_route(client, scrape):
+    client.post("/subdivide", content=b"x", headers=GLB | {"Host": "another"})
+    client.get("/jobs/of-somebody", headers={"Host": "another"})
+    client.post("/report", content=b"x", headers=GLB | {"Content-Length": str(2**40)})
+    values = scrape(client.app.state.metrics)
+    for route, method, status in (
+        ("/subdivide", "POST", "421"),
+        ("/jobs/{job_id}", "GET", "421"),
+        ("/report", "POST", "413"),
+    ):
+        counted = {"route": route, "method": method, "status": status}
+        assert sum(
+            value
+            for (name, labels), value in values.items()
+            if name == "pns_requests_total" and counted.items() <= dict(labels).items()
+        ), route
+
+
 def test_a_stranger_cannot_make_series(client, scrape):
     for n in range(20):
         client.request(f"M{n}", f"/made-up-{n}")
