@@ -119,7 +119,9 @@ def test_a_drum_of_twelve_sides_is_round_and_a_box_of_quads_a_box(levels):
     made = subdivide(Mesh(*cylinder(12, height=2.0)), levels=levels).vertices
     size = np.hypot(made[:, 0], made[:, 1])
     walls = (made[:, 2] > 0.01) & (made[:, 2] < 1.99)
-    np.testing.assert_allclose(size[walls], 1, atol=0.03)
+    # The prism itself is off by .034, at each of its sides.
+    np.testing.assert_allclose(size[walls], 1, atol=0.033)
+    assert np.ptp(size[walls]) < 0.03
     # Rims are crisp: some of it lies where walls and lids meet.
     assert np.hypot(size - 1, made[:, 2] - 2).min() < 0.02
     corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)]) - 0.5

@@ -69,7 +69,7 @@ def test_rows_say_what_was_changed_or_lost(tmp_path):
     assert told["a.obj"] == []
     assert told["bare.obj"] == [
         "1 × vertex normals that no face names dropped",
-        "1 × degenerate faces dropped",
+        "1 × degenerate faces dropped: harmless, they have no area",
     ]
     lost = "1 × definitions of materials dropped: not written to OBJ files (/materials)"
     assert lost in told["d.glb"]
