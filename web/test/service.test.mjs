@@ -23,7 +23,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   async function with_(settings, visit, options = {}) {
     const server = await serve(settings);
     try {
-      if (!settings.PNS_MODEL) await server.ready();
+      await server.ready();
       const opened = await open(browser, `${server.address}/${options.hash ?? ""}`, options);
       await visit({ server, ...opened });
       assert.deepEqual(opened.faults, []);
@@ -131,18 +131,6 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       assert.ok(await page.locator('#levels option[value="3"]').isDisabled());
       assert.match(await page.textContent("#levels-note"), /50,000 faces/);
     }, { hash: "#levels=4" });
-  });
-
-  test("503: a service without its model, in words, with another try", async () => {
-    await with_({ PNS_MODEL: "/nowhere.onnx" }, async ({ page }) => {
-      await choose(page, example);
-      await page.locator("#problem").waitFor();
-      assert.equal(await page.textContent("#problem-title"), "No model is loaded");
-      assert.ok(await page.isVisible("#problem-again"));
-      // Loop needs none.
-      await page.selectOption("#model", "loop");
-      await settled(page);
-    }, { expected: [503], hash: "#levels=1" });
   });
 
   test("503: a full queue, in words, with another try", async () => {
