@@ -272,17 +272,21 @@ def clean(mesh: Mesh) -> Cleaned:
     check_is_mesh(mesh)
     degrees, leader = np.diff(mesh.offsets), np.arange(mesh.face_count)
     degenerate = np.empty(mesh.face_count, dtype=bool)
-    for degree in np.unique(degrees):
+    for degree in np.flatnonzero(np.bincount(degrees)):
         rows = np.flatnonzero(degrees == degree)
-        faces = mesh.corners[mesh.offsets[rows, None] + np.arange(degree)]
+        if mesh.triangles:
+            faces = mesh.faces
+        else:
+            faces = mesh.corners[mesh.offsets[rows, None] + np.arange(degree)]
         degenerate[rows] = repeats = repeated_vertex(faces)
-        rows = rows[~repeats]
-        leader[rows] = rows[_first_alike(faces[~repeats], len(mesh.vertices))]
+        proper = np.flatnonzero(~repeats)
+        alike = _first_alike(np.take(faces, proper, axis=0), len(mesh.vertices))
+        leader[rows[proper]] = rows[proper[alike]]
     if degenerate.all():
         raise MeshError("every face is degenerate", element="faces")
     stays = ~degenerate & (leader == np.arange(len(leader)))
     number = np.cumsum(stays) - 1
-    kept = mesh.corners[np.repeat(stays, degrees)]
+    kept = mesh.corners if stays.all() else mesh.corners[np.repeat(stays, degrees)]
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[kept] = True
     vertex_map = np.where(used, np.cumsum(used) - 1, -1)
