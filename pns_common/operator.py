@@ -329,7 +329,7 @@ def face_inputs(
     rows: Integer[np.ndarray, " N"],
     opened: Float[np.ndarray, " F"] | None = None,
 ) -> Inputs:
-    """Return what surrounds the network at faces, likewise; z is the length along the normal."""
+    """Return what surrounds the network at faces, of gates `opened`; z is along the normal."""
     mesh, count, edges = level.topology, len(rows), level.edges
     made, basis = np.empty((count, frames.FACE_MEASURES)), np.zeros((count, 9))
     of_faces = mesh.corners, mesh.offsets, mesh.corner_edges

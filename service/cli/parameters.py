@@ -51,9 +51,8 @@ def takes_options(command: Command) -> Command:
         )
         for option in fields(Options)
     ]
-    kept = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in own.parameters.values()][
-        :-1
-    ]
+    before = [*own.parameters.values()][:-1]
+    kept = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in before]
     ordered = sorted([*kept, *made], key=_place)
     command.__signature__ = own.replace(parameters=ordered)  # type: ignore[attr-defined]
     return command

@@ -38,12 +38,11 @@ ASKED = ("model", "target", "content_type", "encoding", "request_id")
 
 View = Callable[[Job], dict[str, Any]]
 
-log = logging.getLogger("pns.service")
-
-
 # How long to wait before the end of a job is told again to a store that did not answer. After that
 # the job is left to whichever replica finds the store first.
 AGAIN_SECONDS = (1.0, 2.0, 4.0, 8.0)
+
+log = logging.getLogger("pns.service")
 
 
 class SharedJobs:

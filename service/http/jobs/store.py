@@ -302,16 +302,16 @@ class JobStore:
                 steps.smembers(FETCHED)
                 held, fetched = await steps.execute()
             now = time.time()
-            entries = {name: json.loads(text) for name, text in held.items()}
-            if over := [name for name, entry in entries.items() if entry["until"] < now]:
+            every = {name: json.loads(text) for name, text in held.items()}
+            entries = {name: entry for name, entry in every.items() if entry["until"] >= now}
+            if over := every.keys() - entries.keys():
                 await self._redis.hdel(HELD, *over)
         kept = {}
         for name, entry in sorted(entries.items(), key=lambda item: item[1]["until"]):
-            if name not in over:
-                done, taken = entry["done"], name in fetched
-                promised = done and not taken and now < entry["promised_until"]
-                networks = tuple(entry["networks"])
-                kept[name.decode()] = Kept(networks, entry["size"], done, taken, promised)
+            done, taken = entry["done"], name in fetched
+            promised = done and not taken and now < entry["promised_until"]
+            networks = tuple(entry["networks"])
+            kept[name.decode()] = Kept(networks, entry["size"], done, taken, promised)
         return kept
 
     async def fetched(self, job_id: str) -> None:

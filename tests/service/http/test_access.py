@@ -229,21 +229,22 @@ def test_guessing_ends_for_the_name_that_is_guessed_and_locks_out_no_other(keys_
     assert client.get("/healthz", headers=bearer(OTHER)).status_code == 200
 
 
-def wrong_key_from(layer, address, name="x"):
-    """The status that a wrong key gets."""
+async def status_of(layer, key, address):
+    """Return the status that a key gets."""
     said = []
 
     async def send(message):
         said.append(message.get("status"))
 
-    key = f"Bearer pns_{name}_{'w' * 43}".encode()
-    scope = {"type": "http", "headers": [(b"authorization", key)], "path": "/jobs"}
-
-    async def ask():
-        await layer(scope | {"client": (address, 1)}, None, send)
-
-    asyncio.run(ask())
+    headers = [(b"authorization", f"Bearer {key}".encode())]
+    scope = {"type": "http", "headers": headers, "path": "/jobs", "client": (address, 1)}
+    await layer(scope, None, send)
     return said[0]
+
+
+def wrong_key_from(layer, address, name="x"):
+    """Return the status that a wrong key gets."""
+    return asyncio.run(status_of(layer, f"pns_{name}_{'w' * 43}", address))
 
 
 def test_a_site_of_ipv6_guesses_no_more_than_its_subscribers_may():
@@ -272,16 +273,8 @@ def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeyp
             assert let_go.wait(600)
             return super().find(key, name)
 
-    async def refused(number):
-        said = []
-
-        async def send(message):
-            said.append(message.get("status"))
-
-        key = f"Bearer pns_x_{number:043d}".encode()
-        scope = {"type": "http", "headers": [(b"authorization", key)], "path": "/jobs"}
-        await layer(scope | {"client": (f"192.0.2.{number}", 1)}, None, send)
-        return said[0]
+    def refused(number):
+        return status_of(layer, f"pns_x_{number:043d}", f"192.0.2.{number}")
 
     async def scenario():
         waiting = [asyncio.create_task(refused(number)) for number in range(MOST_WAITING + 1)]
@@ -308,26 +301,15 @@ def test_a_first_burst_with_one_key_waits_for_its_one_check(monkeypatch):
             assert let_go.wait(600)
             return super().find(key, name)
 
-    async def status(layer):
-        said = []
-
-        async def send(message):
-            said.append(message.get("status"))
-
-        headers = [(b"authorization", f"Bearer {KEY}".encode())]
-        scope = {"type": "http", "headers": headers, "path": "/jobs", "client": ("192.0.2.1", 1)}
-        await layer(scope, None, send)
-        return said[0]
-
     async def scenario():
         layer = Bearer(PlainTextResponse("served"), {"studio": entry})
-        burst = [asyncio.create_task(status(layer)) for _ in range(200)]
+        burst = [asyncio.create_task(status_of(layer, KEY, "192.0.2.1")) for _ in range(200)]
         await asyncio.sleep(0.05)
         # Who leaves ends the check for nobody else.
         burst.pop(0).cancel()
         let_go.set()
         assert await asyncio.gather(*burst) == [200] * 199
-        assert await status(layer) == 200
+        assert await status_of(layer, KEY, "192.0.2.1") == 200
 
     entry = Entry(name="studio", hash=hashed_by(KEY, 4))
     monkeypatch.setattr(bearer_layer, "Keyring", Slow)
