@@ -100,7 +100,7 @@ models: $(DEV)/.ready
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
 SOAK ?= --minutes 10
-soak: $(DEV)/.ready
+soak: kernels
 	$(DEV)/bin/python -m tests.soak $(SOAK)
 
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.

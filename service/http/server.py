@@ -23,7 +23,6 @@ from ..settings import Settings, StartError
 from ..workers.jobs import hold_model
 from .admission import Admission
 from .app import create_app
-from .room import BEYOND, connections_that_fit
 from .watch.metrics import Metrics, scrapes
 
 log = logging.getLogger("pns.service")
@@ -126,8 +125,7 @@ class DrainingServer(PromptServer):
     def __init__(
         self, app: FastAPI, settings: Settings, beside: uvicorn.Server | None = None
     ) -> None:
-        most = connections_that_fit(settings)
-        super().__init__(configuration(app, settings, most), settings.head_seconds, most)
+        super().__init__(configuration(app, settings), settings.head_seconds, app.state.most)
         metrics: Metrics = app.state.metrics
         text, connections = "Open connections", self.server_state.connections
         metrics.gauge("pns_connections", text, lambda: len(connections))
@@ -261,15 +259,14 @@ def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
-def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config:
-    """Return uvicorn's settings, for `most` connections beside those that are idle."""
+def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """Return uvicorn's settings."""
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
         proxy_headers=bool(settings.proxies),
         forwarded_allow_ips=[str(network) for network in settings.proxies],
-        limit_concurrency=most + BEYOND,
         backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
         **ALIKE,
