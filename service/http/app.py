@@ -177,13 +177,7 @@ async def _tell_when_ready(service: Service) -> None:
 
 def _show(metrics: Metrics, desk: Desk) -> None:
     """Set what the metrics say of jobs."""
-    desk.watchers.append(
-        lambda job: metrics.job(
-            job.seconds,
-            0 if job.done is None else job.done.faces_in,
-            0 if job.done is None else job.done.faces,
-        )
-    )
+    desk.watchers.append(metrics.job)
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
     metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)

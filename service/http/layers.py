@@ -59,7 +59,7 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = Journal(Crowd(app, most), (metrics.request,))
+    app = Journal(Crowd(app, most), metrics.request)
     return app if tracer is None else Traced(app, tracer)
 
 
