@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import os
 import signal
@@ -217,6 +218,10 @@ def serve(settings: Settings) -> None:
     # Under nohup the signal stays ignored.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
+    # What is loaded stays: to search it for cycles again and again holds the event loop for tens of
+    # milliseconds.
+    gc.collect()
+    gc.freeze()
     server.run()
 
 
