@@ -14,7 +14,7 @@ from jaxtyping import Float, Integer
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases, chosen_creases
 from pns_common.errors import MeshError, ModelError, ParameterError
-from pns_common.features import FEATURE_COUNT
+from pns_common.features import FEATURE_SETS
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
 from pns_common.model.card import PAPER_FORMAT
@@ -142,7 +142,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     named = {"budget": budget, "model": model.name, "model_hash": model.hash}
     rule = Rule(
         partial(_edges_at_unit_budget, model),
-        FEATURE_COUNT[card.features],
+        FEATURE_SETS[card.features],
         card.orientation == "symmetric",
         card.gate_sharpness,
         budget,
