@@ -119,7 +119,7 @@ class FeatureSet:
 
     @property
     def rings(self) -> bool:
-        """Whether any group reads rings."""
+        """True where any group reads rings."""
         return any(group.rings for group in self.groups)
 
     @cached_property
