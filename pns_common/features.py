@@ -210,7 +210,9 @@ EDGE_GROUPS = (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA)
 
 _UNSIGNED, _SIGNED = (HALF_TURN, MIRROR), (HALF_TURN, MIRROR, TURN_OVER)
 PAPER_5 = FeatureSet("paper-5", (_CURVATURE, _SHAPE), _UNSIGNED)
-SIGNED_18 = FeatureSet("signed-18", EDGE_GROUPS, _SIGNED)
+SIGNED_18 = FeatureSet(
+    "signed-18", (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA), _SIGNED
+)
 RING_10 = FeatureSet("ring-10", (_RING,), (RING_TURN_OVER,))
 
 FACE_8 = FeatureSet("face-8", (_FACE,), (RING_TURN_OVER,))
@@ -221,9 +223,3 @@ FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
 )
 RING_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({RING_10.name: RING_10})
 FACE_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({FACE_8.name: FACE_8})
-FEATURE_COUNT: Mapping[str, int] = MappingProxyType(
-    {
-        name: seen.count
-        for name, seen in {**FEATURE_SETS, **RING_FEATURE_SETS, **FACE_FEATURE_SETS}.items()
-    }
-)

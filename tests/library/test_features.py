@@ -6,7 +6,6 @@ import pytest
 from pns_common import Mesh
 from pns_common.features import (
     EDGE_GROUPS,
-    FEATURE_COUNT,
     FEATURE_SETS,
     HALF_TURN,
     MIRROR,
@@ -19,6 +18,7 @@ from pns_common.features import (
     symmetries,
 )
 from pns_common.level import Level
+from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
 from pns_common.operator import Rule, edge_inputs, vertex_inputs
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
@@ -34,7 +34,7 @@ def test_the_symmetries_are_a_group_of_involutions(name):
     elements = list(zip(group.order, group.signs, group.local, strict=True))
     known = {(tuple(o), tuple(s), tuple(d)) for o, s, d in elements}
     count = SETS[name].count
-    assert FEATURE_COUNT[name] == count == int(name.partition("-")[2])
+    assert {**EDGE_FEATURES, **VERTEX_FEATURES}[name] == count == int(name.partition("-")[2])
     np.testing.assert_array_equal(elements[0][0], np.arange(count))
     size = 2 if name == "ring-10" else 8 if any(f.turn_over < 0 for f in declared) else 4
     assert len(known) == size
@@ -142,8 +142,8 @@ def test_a_set_of_any_groups_has_their_columns_and_no_others(groups, polygons):
         rule = Rule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
         return edge_inputs(level, rule, level.topology.interior).features
 
-    whole = columns(SIGNED_18)
-    of_group = dict(zip(EDGE_GROUPS, SIGNED_18.starts, strict=True))
+    every = FeatureSet("every", EDGE_GROUPS, (HALF_TURN,))
+    whole, of_group = columns(every), dict(zip(EDGE_GROUPS, every.starts, strict=True))
     places = [of_group[g] + k for g in groups for k in range(len(g.features))]
     made = columns(FeatureSet("composed", tuple(groups), (HALF_TURN,)))
     np.testing.assert_array_equal(made, whole[:, places])
