@@ -18,7 +18,7 @@ from pns_common.report import LevelReport
 BENT = math.radians(0.5)
 # From this share of bent edges that stay sharp on, a shape looks faceted.
 MANY_SHARP = 0.5
-# Degrees. The first is offered for a rounder shape that keeps at most this share of what stays sharp now.
+# Degrees. The first is offered that keeps at most this share of what stays sharp now.
 ANGLES = range(40, 180, 20)
 FEWER = 0.5
 # From this share of borders on, faces do not hang together.
@@ -27,7 +27,7 @@ MOST_OPEN = 0.9
 
 @dataclass(frozen=True)
 class Bends:
-    """Number of bent edges of a control mesh, of those kept sharp, of those beyond each of ANGLES."""
+    """Number of bent edges of a control mesh, of those kept sharp, of those beyond each angle."""
 
     bent: int = 0
     sharp: int = 0
