@@ -65,7 +65,7 @@ def test_a_solid_stays_as_it_is_where_opencascade_cannot_round_it(monkeypatch, e
         def __init__(self, shape):
             pass
 
-        def Add(self, size, edge):
+        def Add(self, size, edge):  # noqa: N802 (as OpenCascade names it)
             raise error("only 2 faces")
 
     monkeypatch.setattr(brep, "BRepFilletAPI_MakeFillet", Maker)
