@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from .errors import LimitError
+
 try:
     import resource
 except ImportError:  # Windows has no such limit.
@@ -15,11 +17,21 @@ _STATM = Path("/proc/self/statm")
 
 
 @contextmanager
-def memory_cap(extra: int) -> Iterator[None]:
-    """Let the process grow by at most `extra` bytes of address space; beyond it, MemoryError.
+def memory_cap(allowed: int, text: str, slack: int = 0) -> Iterator[None]:
+    """Let the process grow by at most `allowed` and `slack` bytes of address space.
 
-    Linux only; other systems have no cap.
+    Linux only; other systems have no cap. Raises LimitError, which says `text`.
     """
+    try:
+        with _capped(allowed + slack):
+            yield
+    except MemoryError as error:
+        # Where it stopped is not known; it asked for a byte more than was left, or for many.
+        raise LimitError(text, limit="memory", allowed=allowed, found=allowed + 1) from error
+
+
+@contextmanager
+def _capped(extra: int) -> Iterator[None]:
     if resource is None or not _STATM.exists():
         yield
         return

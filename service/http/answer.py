@@ -55,7 +55,8 @@ class FileAnswer(Response):
             taking = self._admission.answering(self._client, self._content.size)
             try:
                 async with self._admission.working(), taking:
-                    await self._send_start(send)
+                    start = {"status": self.status_code, "headers": self.raw_headers}
+                    await send({"type": "http.response.start"} | start)
                     if await self._send_pieces(send, receive):
                         self._sent()
             except TimeoutError:
@@ -64,15 +65,6 @@ class FileAnswer(Response):
                 log.warning("an answer is cut off: its memory is needed")
             except DrainingError:
                 log.warning("an answer was cut off by the shutdown")
-
-    async def _send_start(self, send: Send) -> None:
-        await send(
-            {
-                "type": "http.response.start",
-                "status": self.status_code,
-                "headers": self.raw_headers,
-            }
-        )
 
     async def _send_pieces(self, send: Send, receive: Receive) -> bool:
         """Return whether the client was there for all of them."""
@@ -126,6 +118,12 @@ def answer_type(request: Request, file_type: str = media.GLB) -> str:
     accept = ",".join(request.headers.getlist("accept"))
     # In the order of preference among equals.
     return max((file_type, media.JSON, media.BYTES), key=lambda kind: media.quality(kind, accept))
+
+
+def is_known(tag: str, request: Request) -> bool:
+    """Return whether the client has the content of an ETag: its If-None-Match says so."""
+    sent = request.headers.get("if-none-match", "").split(",")
+    return bool({one.strip().removeprefix("W/") for one in sent} & {tag, "*"})
 
 
 def server_timing(seconds: dict[str, float]) -> str:

@@ -28,12 +28,10 @@ from .access.keys import read_keys
 from .access.origins import is_loopback
 from .admission import Admission
 from .jobs import routes as job_routes
-from .jobs import work as job_work
 from .jobs.book import JobBook
-from .jobs.room import Room
 from .jobs.shared import SharedJobs
 from .jobs.store import JobStore
-from .room import with_results_that_fit
+from .room import BEYOND, connections_that_fit, with_results_that_fit
 from .service import ReadOnce, Service
 from .watch.metrics import Metrics
 from .watch.tracing import tracer_from_environment
@@ -66,6 +64,7 @@ def create_app(
     be sent.
     """
     settings = with_results_that_fit(settings or Settings())
+    most = connections_that_fit(settings)
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
     workers = {
@@ -99,9 +98,9 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        if keys is None:
+        if keys is None and not is_loopback(settings.host):
             log.warning("open to everybody: no PNS_KEYS_FILE is set")
-        else:
+        elif keys is not None:
             log.info("open to the bearers of %d keys", len(keys))
         if not settings.proxies and not is_loopback(settings.host):
             log.warning(
@@ -113,7 +112,7 @@ def create_app(
         beside = []
         if shared is not None:
             log.info("jobs are shared with other replicas; this one is %s", shared.store.replica)
-            beside.append(asyncio.create_task(shared.adopt_for_ever(service)))
+            beside.append(asyncio.create_task(shared.adopt_for_ever()))
         if warm_up is None:
             # Stand-ins load no model.
             beside.append(asyncio.create_task(_tell_when_ready(service)))
@@ -144,7 +143,10 @@ def create_app(
     )
     # Whoever names a route puts this before it; requests come without it.
     app.root_path = settings.prefix
-    app.layers = lambda routes: layers.around(routes, settings, metrics, keys, tracer)
+    app.layers = lambda routes: layers.around(
+        routes, settings, most + BEYOND, metrics, keys, tracer
+    )
+    app.state.most = most
     app.state.admission = admission
     app.state.desk = desk
     app.state.metrics = metrics
@@ -152,18 +154,9 @@ def create_app(
     models = ReadOnce(workers[Lane.SHORT], admission, catalogue, metrics.catalogue)
     service = Service(settings, desk, admission, models, book)
     if settings.store is not None:
-        service.shared = SharedJobs(
-            JobStore(settings),
-            Room(int(settings.result_bytes), settings.results),
-            partial(job_work.job_json, service),
-            partial(job_work.shown, service),
-            partial(job_work.begin_shared, service),
-        )
-    metrics.gauge(
-        "pns_result_bytes",
-        "Results that are kept; with a store those of all replicas",
-        lambda: (service.shared or book).bytes,
-    )
+        service.shared = SharedJobs(service, JobStore(settings))
+    text = "Results that are kept here, none with a store"
+    metrics.gauge("pns_result_bytes", text, lambda: book.bytes)
     routers = [routes.router(service), job_routes.router(service), pages.router(settings.prefix)]
     for router in routers:
         app.include_router(router)
@@ -184,13 +177,7 @@ async def _tell_when_ready(service: Service) -> None:
 
 def _show(metrics: Metrics, desk: Desk) -> None:
     """Set what the metrics say of jobs."""
-    desk.watchers.append(
-        lambda job: metrics.job(
-            job.seconds,
-            0 if job.done is None else job.done.faces_in,
-            0 if job.done is None else job.done.faces,
-        )
-    )
+    desk.watchers.append(metrics.job)
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
     metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)

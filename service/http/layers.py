@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from ..errors import BusyError
 from ..settings import Settings
+from . import problems
 from .access.bearer import Bearer
 from .access.keys import Entry
 from .access.origins import Origins, hosts_of
@@ -27,17 +30,21 @@ TAKEN = (
 # What it may read of an answer beside its body.
 EXPOSED = ("ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID")
 
+PROBES = frozenset({"/healthz", "/readyz"})
+
 
 def around(
     app: ASGIApp,
     settings: Settings,
+    most: int,
     metrics: Metrics,
     keys: dict[str, Entry] | None,
     tracer: Tracer | None = None,
 ) -> ASGIApp:
     """Lay around `app` everything that is done for every request.
 
-    `keys` None: it is open to everybody; `tracer` None: nothing is traced.
+    `most` requests may be under way. `keys` None: it is open to everybody; `tracer` None: nothing
+    is traced.
     """
     app = Head(app)
     app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
@@ -52,7 +59,7 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = Journal(app, (metrics.request,))
+    app = Journal(Crowd(app, most), metrics.request)
     return app if tracer is None else Traced(app, tracer)
 
 
@@ -64,6 +71,37 @@ def upload_pace(settings: Settings) -> Pace:
         idle=settings.idle_seconds,
         whole=settings.upload_seconds,
     )
+
+
+class Crowd:
+    """ASGI layer that begins requests one after the other, of which `most` may be under way.
+
+    Hundreds that come at the same moment would hold the event loop together. Probes pass them.
+    """
+
+    def __init__(self, app: ASGIApp, most: int) -> None:
+        self.app = app
+        self._most = most
+        self._under_way = 0
+        self._turn = asyncio.Lock()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http" or scope["path"] in PROBES:
+            await self.app(scope, receive, send)
+            return
+        if self._under_way >= self._most:
+            answer = problems.of_service_error(BusyError("too many requests are under way"))
+            answer.headers["Connection"] = "close"
+            await answer(scope, receive, send)
+            return
+        self._under_way += 1
+        try:
+            async with self._turn:
+                await asyncio.sleep(0)
+            await self.app(scope, receive, send)
+        finally:
+            self._under_way -= 1
 
 
 class Head:

@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 from ..bodies.media import quality
+from .answer import is_known
 
 PAGE = Path(__file__).resolve().parent.parent / "web"
 DOCS = Path(__file__).resolve().parent / "docs_ui"
@@ -109,8 +110,7 @@ def _answer(request: Request, file: _File, policy: str, caching: str = ASK_AGAIN
         "Referrer-Policy": "no-referrer",
         "Vary": "Accept-Encoding",
     }
-    known = request.headers.get("if-none-match", "")
-    if file.tag in {tag.strip().removeprefix("W/") for tag in known.split(",")} or known == "*":
+    if is_known(file.tag, request):
         return Response(status_code=304, headers=headers)
     content = file.content
     if quality("gzip", request.headers.get("accept-encoding", "")):

@@ -18,7 +18,7 @@ from ..workers.catalogue import ModelEntry
 from ..workers.job import Job
 from . import documentation
 from .admission import DrainingError
-from .answer import FileAnswer, answer_type, server_timing, unless_gone
+from .answer import FileAnswer, answer_type, is_known, server_timing, unless_gone
 from .clients import Client, client_of
 from .intake import Wanted, taken_in
 from .parameters import Parameters
@@ -85,7 +85,7 @@ def router(service: Service) -> APIRouter:
         catalogue = await service.models.get()
         # It may change when the service starts again, so a copy is asked for, and costs nothing.
         headers = {"ETag": catalogue.tag, "Cache-Control": "no-cache"}
-        if catalogue.is_known(request.headers.get("if-none-match", "")):
+        if is_known(catalogue.tag, request):
             return Response(status_code=304, headers=headers)
         return Response(catalogue.content, headers=headers, media_type=media.JSON)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import os
 import signal
@@ -21,9 +22,9 @@ from .. import log_lines
 from ..errors import NoModelError
 from ..settings import Settings, StartError
 from ..workers.jobs import hold_model
+from .access.origins import is_loopback
 from .admission import Admission
 from .app import create_app
-from .room import BEYOND, connections_that_fit
 from .watch.metrics import Metrics, scrapes
 
 log = logging.getLogger("pns.service")
@@ -126,8 +127,7 @@ class DrainingServer(PromptServer):
     def __init__(
         self, app: FastAPI, settings: Settings, beside: uvicorn.Server | None = None
     ) -> None:
-        most = connections_that_fit(settings)
-        super().__init__(configuration(app, settings, most), settings.head_seconds, most)
+        super().__init__(configuration(app, settings), settings.head_seconds, app.state.most)
         metrics: Metrics = app.state.metrics
         text, connections = "Open connections", self.server_state.connections
         metrics.gauge("pns_connections", text, lambda: len(connections))
@@ -147,6 +147,10 @@ class DrainingServer(PromptServer):
             for listening in server.sockets:
                 with listening.dup() as same:
                     same.listen(WAITING)
+                # A line for people, who look for the address among log lines.
+                if is_loopback(self.config.host):
+                    at = f"[{self.config.host}]" if ":" in self.config.host else self.config.host
+                    print(f"Open http://{at}:{listening.getsockname()[1]}", flush=True)
 
     async def serve(self, sockets: list[socket.socket] | None = None) -> None:
         """Serve, with another server beside this one for as long."""
@@ -219,6 +223,10 @@ def serve(settings: Settings) -> None:
     # Under nohup the signal stays ignored.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, server.hang_up)
+    # What is loaded stays: to search it for cycles again and again holds the event loop for tens of
+    # milliseconds.
+    gc.collect()
+    gc.freeze()
     server.run()
 
 
@@ -261,15 +269,14 @@ def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])
 
 
-def configuration(app: FastAPI, settings: Settings, most: int) -> uvicorn.Config:
-    """Return uvicorn's settings, for `most` connections beside those that are idle."""
+def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """Return uvicorn's settings."""
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
         proxy_headers=bool(settings.proxies),
         forwarded_allow_ips=[str(network) for network in settings.proxies],
-        limit_concurrency=most + BEYOND,
         backlog=A_TURN,
         timeout_keep_alive=settings.keep_alive_seconds,  # pyright: ignore[reportArgumentType]
         **ALIKE,

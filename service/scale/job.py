@@ -11,7 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..bodies.media import ALIASES, KINDS, kind_of
-from ..errors import LONGEST, InvalidParameter, LimitError, NoModelError, ServiceError
+from ..errors import LONGEST, InvalidParameter, NoModelError, ServiceError
 from ..options import Limits, Options
 
 if TYPE_CHECKING:
@@ -143,8 +143,9 @@ def _refine(task: Task) -> Row:
             f"{task.model or 'the default model'}: it is not the model that this run began with; "
             "it was replaced, or is another one on a worker's machine"
         )
+    most = task.limits.max_memory_bytes
     try:
-        with memory_cap(task.limits.max_memory_bytes):
+        with memory_cap(most, f"refining took more than {most} bytes"):
             written = converted(
                 data,
                 task.kind,
@@ -156,15 +157,6 @@ def _refine(task: Task) -> Row:
             )
     except PnsError as error:
         raise ServiceError(str(error), code="unrefinable") from error
-    except MemoryError as error:
-        allowed = task.limits.max_memory_bytes
-        # Where it stopped is not known; it asked for a byte more than was left, or for many.
-        raise LimitError(
-            f"refining took more than {allowed} bytes",
-            limit="memory",
-            allowed=allowed,
-            found=allowed + 1,
-        ) from error
     output.write(written.content)
     return Row(
         task.url,

@@ -77,11 +77,6 @@ class Catalogue:
         """The ETag: same content, same tag."""
         return f'"{hashlib.sha256(self.content).hexdigest()[:32]}"'
 
-    def is_known(self, if_none_match: str) -> bool:
-        """Return whether a client that sends this If-None-Match has the content."""
-        tags = {tag.strip().removeprefix("W/") for tag in if_none_match.split(",")}
-        return bool(tags & {self.tag, "*"})
-
 
 def catalogue_of(models: Models) -> Catalogue:
     """Read the catalogue, in a worker; a model that does not load has a name and no entry."""

@@ -7,8 +7,8 @@ imports this module to name its jobs, and never runs them.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -155,19 +155,10 @@ def _learned_levels(work: Work) -> int:
     return work.options.levels if card.format == PAPER_FORMAT else 1
 
 
-@contextmanager
-def job_memory(limits: Limits) -> Iterator[None]:
+def job_memory(limits: Limits) -> AbstractContextManager[None]:
     """Hold the process to what one job may take, whatever was predicted. Raises LimitError."""
-    try:
-        with memory_cap(limits.max_memory_bytes + MEMORY_SLACK):
-            yield
-    except MemoryError as error:
-        raise LimitError(
-            f"the job took more memory than {limits.max_memory_bytes} bytes",
-            limit="memory",
-            allowed=limits.max_memory_bytes,
-            found=limits.max_memory_bytes + 1,
-        ) from error
+    most = limits.max_memory_bytes
+    return memory_cap(most, f"the job took more memory than {most} bytes", MEMORY_SLACK)
 
 
 def _check_answer(work: Work, report: bytes, glb: bytes) -> None:

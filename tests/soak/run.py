@@ -14,7 +14,7 @@ from multiprocessing.synchronize import Event
 from tests.soak import honest
 from tests.soak.attacks import ATTACKS, Attack
 from tests.soak.bodies import large_body
-from tests.soak.process import Held, usually_held_by
+from tests.soak.process import Held, least_held_by
 from tests.soak.samples import samples, small_sample
 from tests.soak.tally import Tally
 from tests.soak.target import Target
@@ -47,9 +47,9 @@ def soak(
     """Run for about so many seconds: a tenth each in quiet before and after, the rest in attacks.
 
     Attackers have addresses of their own, or (`one_source`) none but the honest clients'. Memory is
-    compared between the two quiet times, with the honest clients at work in both. A process grows
-    until it has met all that there is, and what counts is what comes after: `warm_seconds` of every
-    format and attack come before all that.
+    compared between the two quiet times: the least that is held in each, between the honest
+    clients' jobs. A process grows until it has met all that there is, and what counts is what comes
+    after: `warm_seconds` of every format and attack come before all that.
     """
     honest.wait_until_ready(address)
     tally, ended = Tally(), threading.Event()
@@ -90,7 +90,7 @@ def soak(
 def _quiet(seconds: float, pid: int | None) -> Held | None:
     """Let the honest clients alone; what the service holds meanwhile, if its process is known."""
     if pid is not None:
-        return usually_held_by(pid, seconds)
+        return least_held_by(pid, seconds)
     time.sleep(seconds)
     return None
 

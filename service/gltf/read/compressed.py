@@ -12,7 +12,7 @@ import meshopt
 import numpy as np
 from jaxtyping import Shaped
 
-from ...errors import GltfError, LimitError, UnsupportedFeature
+from ...errors import GltfError, UnsupportedFeature
 from ...memory_cap import memory_cap
 from ...options import Limits
 from ..constants import COMPONENT_COUNTS, COMPONENT_TYPES, STRIP, TRIANGLES, UNSIGNED_INT
@@ -218,16 +218,11 @@ def _decode_primitive(
     need += header.points * BYTES_PER_POINT_AND_ATTRIBUTE * len(wanted.attributes)
     check_decoded(need, held, limits)
     _check_claim(document, primitive, header.faces, pointer)
+    most = need + SLACK
+    text = f"the Draco data take more than {most} bytes, which their header accounts for"
     try:
-        with memory_cap(need + SLACK):
+        with memory_cap(most, text):
             mesh = DracoPy.decode(data)
-    except MemoryError as error:
-        raise LimitError(
-            f"the Draco data take more than {need + SLACK} bytes, which their header accounts for",
-            limit="memory",
-            allowed=need + SLACK,
-            found=need + SLACK + 1,
-        ) from error
     except (DracoPy.FileTypeException, TypeError, ValueError) as error:
         raise GltfError(f"the data do not decode: {error}", pointer=here) from error
     faces = getattr(mesh, "faces", None)

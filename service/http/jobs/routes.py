@@ -32,6 +32,7 @@ SILENT_SECONDS = 15.0
 def router(service: Service) -> APIRouter:
     """Make the routes, bound to one service."""
     routes = APIRouter(tags=["jobs"])
+    turn = asyncio.Lock()
 
     @routes.post("/jobs", status_code=202, **documentation.JOBS)
     async def create_job(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
@@ -49,7 +50,7 @@ def router(service: Service) -> APIRouter:
     async def read_job_events(request: Request, job_id: str) -> Response:
         await _view(service, client(request), job_id)
         return StreamingResponse(
-            _events(service, client(request), job_id),
+            _events(service, client(request), job_id, turn),
             media_type="text/event-stream",
             # A proxy that collects the stream (nginx) would keep it until its end.
             headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
@@ -79,10 +80,18 @@ def router(service: Service) -> APIRouter:
     return routes
 
 
-async def _events(service: Service, client: str, job_id: str) -> AsyncIterator[str]:
-    """Yield the job as server-sent events, one for each change, until it has ended."""
+async def _events(
+    service: Service, client: str, job_id: str, turn: asyncio.Lock
+) -> AsyncIterator[str]:
+    """Yield the job as server-sent events, one for each change, until it has ended.
+
+    All streams take turns: hundreds of one job wake at the same moment, and would hold the event
+    loop together.
+    """
     said, silent = "", 0.0
     while True:
+        async with turn:
+            await asyncio.sleep(0)
         try:
             view = await _view(service, client, job_id)
         except ServiceError:

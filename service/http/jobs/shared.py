@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
 from contextlib import AsyncExitStack, ExitStack, suppress
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...errors import BusyError, ServiceError, WorkerDied
 from ...options import Options
@@ -16,8 +15,9 @@ from ...workers.memory_file import MemoryFile
 from .. import problems
 from ..intake import Wanted, made_of
 from ..room import result_folder
+from ..service import Service
 from .book import Entry, NoSuchJobError
-from .room import Kept, Room
+from .room import Room
 from .store import (
     ANSWER,
     BEAT_SECONDS,
@@ -29,14 +29,10 @@ from .store import (
     Record,
     StoreError,
 )
-
-if TYPE_CHECKING:
-    from ..service import Service
+from .work import begin_shared, job_json, shown
 
 # Of a job's work what a request names, beside its options.
 ASKED = ("model", "target", "content_type", "encoding", "request_id")
-
-View = Callable[[Job], dict[str, Any]]
 
 # How long to wait before the end of a job is told again to a store that did not answer. After that
 # the job is left to whichever replica finds the store first.
@@ -46,44 +42,25 @@ log = logging.getLogger("pns.service")
 
 
 class SharedJobs:
-    """Jobs of all replicas, as one of them sees them.
+    """Jobs of all replicas, as one of them sees them."""
 
-    `view` shows a job as it is, `shown` as clients see it while its end is not stored. `begin` is
-    called to work on a job that another replica has left: it is in the book, and what it holds is
-    given back when its work ends.
-    """
-
-    def __init__(
-        self,
-        store: JobStore,
-        room: Room,
-        view: View,
-        shown: View,
-        begin: Callable[[Entry, AsyncExitStack], None],
-    ) -> None:
+    def __init__(self, service: Service, store: JobStore) -> None:
         self.store = store
-        self.bytes = 0
-        """Bytes of all replicas' results, as they were last counted."""
-        self._room = room
-        self._view = view
-        self._shown = shown
-        self._begin = begin
+        self._service = service
+        settings = service.settings
+        self._room = Room(int(settings.result_bytes), settings.results)
         self._notes: set[asyncio.Task[None]] = set()
 
     async def check_room(self, networks: tuple[str, ...]) -> None:
         """Raise BusyError where a result of this client would find no place now, StoreError."""
-        self._room.check((await self._kept()).values(), networks)
-
-    async def _kept(self) -> dict[str, Kept]:
-        kept = await self.store.kept()
-        self.bytes = sum(one.size for one in kept.values())
-        return kept
+        self._room.check((await self.store.kept()).values(), networks)
 
     async def publish(self, job: Job, owner: str | None) -> None:
         """Make a job known to other replicas, with its body. Raises StoreError, StoreFullError."""
         asked = {name: getattr(job.work, name) for name in ASKED}
         asked |= {"client": job.client, "options": asdict(job.work.options)}
-        await self.store.create(job.id, owner, asked, self._view(job), job.body.pieces())
+        view = job_json(self._service, job)
+        await self.store.create(job.id, owner, asked, view, job.body.pieces())
 
     async def beat(self, entry: Entry) -> None:
         """Keep a job leased until its end is stored; end it where its client wants that."""
@@ -91,7 +68,8 @@ class SharedJobs:
             await asyncio.sleep(BEAT_SECONDS)
             # The lease outlasts a store that is away for a moment.
             with suppress(StoreError):
-                lease = await self.store.beat(entry.job.id, self._shown(entry.job))
+                view = shown(self._service, entry.job)
+                lease = await self.store.beat(entry.job.id, view)
                 if lease is Lease.HELD:
                     continue
                 entry.cancelled = lease is Lease.CANCELLED
@@ -129,19 +107,21 @@ class SharedJobs:
         files = (job.answer, job.report) if job.state is State.DONE else (None, None)
         sizes = [0 if file is None else file.size for file in files]
         try:
-            for name in self._room.leaving(await self._kept(), entry.networks, sum(sizes)):
+            for name in self._room.leaving(await self.store.kept(), entry.networks, sum(sizes)):
                 await self.store.delete(name)
             results = {
                 name: file.pieces()
                 for name, file in zip((ANSWER, REPORT), files, strict=True)
                 if file is not None
             }
-            await self.store.finish(job.id, self._view(job), results, entry.networks)
+            view = job_json(self._service, job)
+            await self.store.finish(job.id, view, results, entry.networks)
         except StoreError:
             raise
         except BusyError as error:
             job.state, job.error = State.FAILED, error
-            await self.store.finish(job.id, self._view(job), {}, entry.networks)
+            view = job_json(self._service, job)
+            await self.store.finish(job.id, view, {}, entry.networks)
 
     def fetched(self, job_id: str) -> None:
         """Note that somebody has the result of a job."""
@@ -174,13 +154,12 @@ class SharedJobs:
             held.pop_all()
         return file
 
-    async def adopt_for_ever(self, service: Service) -> None:
+    async def adopt_for_ever(self) -> None:
         """Take the jobs of replicas that have died, one after the other."""
         while True:
             await asyncio.sleep(LEASE_SECONDS / 4)
             try:
-                await self._kept()
-                while not service.admission.draining and await self._adopt(service):
+                while not self._service.admission.draining and await self._adopt():
                     pass
             except StoreError as error:
                 log.warning("jobs of other replicas are not looked at: %s", error)
@@ -191,8 +170,9 @@ class SharedJobs:
                 # A record that this release cannot read, say. Its lease ends; others have a turn.
                 log.exception("a job of another replica is not taken")
 
-    async def _adopt(self, service: Service) -> bool:
+    async def _adopt(self) -> bool:
         """Take one job, where there is one and room for it. Raises StoreError, BusyError."""
+        service = self._service
         service.desk.turns.check_room("")
         record = await self.store.take_orphan(service.book.has)
         if record is None:
@@ -222,7 +202,7 @@ class SharedJobs:
             job.id = record.id
             entry = service.book.add(job, record.owner)
             entry.adopted = True
-            self._begin(entry, held.pop_all())
+            begin_shared(service, entry, held.pop_all())
         return True
 
     async def _fail(self, record: Record, error: ServiceError) -> None:

@@ -51,9 +51,9 @@ class Journal:
     in a log (the id of a job, a file's name).
     """
 
-    def __init__(self, app: ASGIApp, listeners: tuple[Callable[[Entry], None], ...] = ()) -> None:
+    def __init__(self, app: ASGIApp, count: Callable[[Entry], None]) -> None:
         self.app = app
-        self.listeners = listeners
+        self.count = count
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -110,8 +110,7 @@ class Journal:
         name = fields.pop("id")
         fields["milliseconds"] = round(1000 * fields.pop("seconds"), 1)
         log.info("request", extra={"fields": fields, "request_id": name})
-        for listener in self.listeners:
-            listener(entry)
+        self.count(entry)
 
 
 def _route(scope: Scope) -> str:

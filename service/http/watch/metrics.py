@@ -29,6 +29,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...workers.catalogue import Catalogue
+from ...workers.job import Job
 from .journal import Entry
 
 # From a small mesh to the longest job.
@@ -71,15 +72,16 @@ class Metrics:
         self._received.labels(entry.route).inc(entry.received)
         self._sent.labels(entry.route).inc(entry.sent)
 
-    def job(self, seconds: dict[str, float], faces_in: int, faces_out: int) -> None:
+    def job(self, job: Job) -> None:
         """Count a job that has ended; `queue` among the stages is how long it waited."""
-        for stage, value in seconds.items():
+        for stage, value in job.seconds.items():
             if stage == "queue":
                 self._queue_seconds.observe(value)
             else:
                 self._stage_seconds.labels(stage).observe(value)
-        self._faces.labels("in").inc(faces_in)
-        self._faces.labels("out").inc(faces_out)
+        if job.done is not None:
+            self._faces.labels("in").inc(job.done.faces_in)
+            self._faces.labels("out").inc(job.done.faces)
 
     def catalogue(self, catalogue: Catalogue) -> None:
         """Say which models are served."""

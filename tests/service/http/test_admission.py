@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
+from starlette.types import Message, Receive, Scope, Send
 
 from service.errors import BusyError
 from service.http.admission import Admission, CutOffError, DrainingError
+from service.http.layers import Crowd
 
 
 def run(scenario: Callable[[], Awaitable[None]]) -> None:
@@ -219,3 +222,34 @@ def test_a_timeout_of_the_work_itself_stays_one() -> None:
                     await asyncio.sleep(60)
 
     run(scenario)
+
+
+def test_a_probe_passes_a_crowd_and_what_is_too_much_is_refused() -> None:
+    """Requests begin one in a turn of the event loop; a probe begins as it comes."""
+    begun: list[str] = []
+    sent: list[dict[str, Any]] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        begun.append(scope["path"])
+
+    async def send(message: Message) -> None:
+        sent.append(dict(message))
+
+    async def scenario() -> None:
+        crowd = Crowd(app, 100)
+        receive: Any = None
+
+        def come(path: str) -> asyncio.Task[None]:
+            return asyncio.create_task(crowd({"type": "http", "path": path}, receive, send))
+
+        requests = [come(f"/{number}") for number in range(101)]
+        await asyncio.sleep(0)
+        await come("/healthz")
+        assert len(begun) < 10
+        await asyncio.gather(*requests)
+
+    asyncio.run(scenario())
+    assert [path for path in begun if path != "/healthz"] == [f"/{n}" for n in range(100)]
+    assert sent[0]["status"] == 503
+    assert dict(sent[0]["headers"])[b"connection"] == b"close"
+    assert b"retry-after" in dict(sent[0]["headers"])

@@ -193,12 +193,18 @@ def test_hundreds_of_silent_connections_are_gone_and_keep_nobody_out(front):
 
 
 def test_the_service_recovers_from_more_requests_than_it_has_connections():
-    """Uploads that stall fill all that there is; once they end, the next client is served."""
+    """Uploads that stall fill all that there is; once they end, the next client is served.
+
+    Probes are answered meanwhile: else a cluster would end the service for it.
+    """
     with served(workers=1, connections=4, idle_seconds=0.5) as address, ExitStack() as opened:
         for _ in range(300):
             with suppress(OSError):
                 connection = opened.enter_context(connect(address))
                 connection.sendall(head("POST", "/subdivide", "Content-Length: 1000\r\n"))
+        with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as probe:
+            probe.request("GET", "/healthz")
+            assert probe.getresponse().status == 200
         wait_until_served(address)
 
 

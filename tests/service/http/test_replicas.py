@@ -22,7 +22,6 @@ from typing import Any, cast
 import httpx2
 import pytest
 
-from service.http.jobs.room import Kept, Room
 from service.http.jobs.shared import SharedJobs
 from service.http.jobs.store import ANSWER, BODY, JobStore, Lease, RedisFiles
 from service.settings import Settings
@@ -306,21 +305,19 @@ def test_a_job_whose_file_is_gone_has_failed(redis: str) -> None:
 def test_a_job_that_cannot_be_taken_over_keeps_no_other_from_it(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async def kept() -> dict[str, Kept]:
-        return {}
-
     async def adopt(*_: object) -> bool:
         # Not before it has failed once, and that was logged.
         assert "no options" in caplog.text, "no options"
         raise SystemExit
 
     monkeypatch.setattr("service.http.jobs.shared.LEASE_SECONDS", 0.04)
-    shared = SharedJobs(cast("JobStore", SimpleNamespace(kept=kept)), Room(1, 1), dict, dict, print)
+    settings = SimpleNamespace(result_bytes=1, results=1)
+    service: Any = SimpleNamespace(settings=settings, admission=SimpleNamespace(draining=False))
+    shared = SharedJobs(service, cast("JobStore", None))
     # Of this one alone: replicas of other tests are still at work.
     monkeypatch.setattr(shared, "_adopt", adopt)
-    service: Any = SimpleNamespace(admission=SimpleNamespace(draining=False))
     with pytest.raises(SystemExit):
-        asyncio.run(shared.adopt_for_ever(service))
+        asyncio.run(shared.adopt_for_ever())
 
 
 def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:

@@ -8,6 +8,7 @@ import threading
 import urllib.request
 from collections import Counter
 from contextlib import ExitStack, suppress
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -281,7 +282,9 @@ def test_a_stranger_cannot_make_series(client, scrape):
 
 def test_jobs_faces_models_and_restarts_are_counted(scrape):
     metrics = Metrics()
-    metrics.job({"queue": 0.2, "read": 0.1, "refine": 0.3}, faces_in=4, faces_out=64)
+    done = SimpleNamespace(faces_in=4, faces=64)
+    seconds = {"queue": 0.2, "read": 0.1, "refine": 0.3}
+    metrics.job(SimpleNamespace(seconds=seconds, done=done))
     entry = {"name": "general", "hash": "ab" * 32, "default": True}
     metrics.catalogue(Catalogue(("general",), json.dumps([entry]).encode()))
     metrics.gauge("pns_queue_jobs", "Jobs that wait", lambda: 3)

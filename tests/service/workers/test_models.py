@@ -8,11 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from starlette.requests import Request
 
 from pns_common.model import file as model_file
 from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.errors import InvalidParameter, NoModelError
+from service.http.answer import is_known
 from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
 from service.workers.models import Models
 from tests.support.packages import served_file, several_models
@@ -142,6 +144,6 @@ def test_same_models_same_bytes_same_tag() -> None:
     [("{tag}", True), ("W/{tag}", True), ('"a", {tag}', True), ("*", True), ("", False)],
 )
 def test_a_client_that_has_the_list_is_recognised(header: str, known: bool) -> None:
-    catalogue = Catalogue((), b"[]")
-    assert catalogue.is_known(header.format(tag=catalogue.tag)) is known
-    assert not catalogue.is_known('"another"')
+    tag = Catalogue((), b"[]").tag
+    headers = [(b"if-none-match", header.format(tag=tag).encode())]
+    assert is_known(tag, Request({"type": "http", "headers": headers})) is known

@@ -164,7 +164,7 @@ def test_attributes_that_a_header_does_not_announce_are_capped():
 
 
 def test_code_under_a_cap_gets_no_more_memory():
-    with pytest.raises(MemoryError), memory_cap(2**26):
+    with pytest.raises(LimitError, match="so much"), memory_cap(2**26, "so much"):
         np.ones(2**27)
     assert np.ones(2**24).sum() == 2**24
 
