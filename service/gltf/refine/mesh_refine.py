@@ -200,11 +200,11 @@ def _skin_and_morph_of_union(
         mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
     )
     own = split_faces(levels[-1], blocks, np.int64)
-    refined, *losses = refined_skin_and_morph(control, own, levels, options, course, parts)
+    refined, cut, lost = refined_skin_and_morph(control, own, levels, options, course, parts)
     # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
     vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
     vertex[faces] = own
-    return refined.take(vertex), *losses
+    return refined.take(vertex), cut, lost
 
 
 def _jobs(
