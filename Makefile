@@ -9,6 +9,10 @@ PEERS := .venv-bench
 INTEROP := .venv-interop
 # Tests start hundreds of processes: each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_ROOT_USER_ACTION := ignore
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_ROOT_USER_ACTION := ignore
 # Pins what is installed, and what builds it. pip takes a list here: a blank in the folder's name would part it.
 export PIP_CONSTRAINT := file://$(subst $() ,%20,$(CURDIR))/constraints.txt
 # What has one maintainer is pinned by hash, and first.
@@ -23,9 +27,8 @@ PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist l
 
 # The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
-	@$(SERVE)/bin/python -m pns_common.warming
-	@$(SERVE)/bin/pns doctor > /dev/null  # the kernels of files
-	$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
+	@$(SERVE)/bin/python -m service.warming
+	@$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take
 # that time. So they are done when the tests are.

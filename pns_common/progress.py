@@ -79,6 +79,8 @@ class Compilation(EVENTS.Listener):
 
     def __init__(self, announce: Callable[[str], None]) -> None:
         self.kernels, self.seconds = 0, 0.0
+        # How far the whole is, where that is known.
+        self.place = ""
         self._announce, self._depth, self._began, self._said = announce, 0, 0.0, 0.0
 
     def on_start(self, _: object) -> None:
@@ -98,7 +100,7 @@ class Compilation(EVENTS.Listener):
         self.kernels += 1
         self.seconds += time.perf_counter() - self._began
         if time.perf_counter() - self._said > QUIET:
-            self._say(f"kernels compiled so far: {self.kernels}")
+            self._say(f"kernels compiled so far: {self.kernels}{self.place}")
 
     def _say(self, text: str) -> None:
         self._said = time.perf_counter()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -23,19 +23,25 @@ CLOSED, SHEET = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], [[0, 1, 2], [2, 1,
 def warm_up(
     announce: Callable[[str], None] = print,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> None:
+    more: Iterable[Callable[[], object]] = (),
+) -> int:
     """Run every kernel once on small meshes, so that later calls find it compiled.
 
     Args:
         announce: called with a sentence if kernels must be compiled first, which takes seconds, and
             now and then meanwhile; loading them takes half a second.
         progress: called with (stages done, stages in all).
+        more: stages that follow those of this package.
+
+    Returns the number of kernels that were compiled.
     """
-    stages = list(_stages())
-    with compiling(announce):
+    stages = [*_stages(), *more]
+    with compiling(announce) as compiled:
         for done, run in enumerate(stages, start=1):
+            compiled.place = f", step {done} of {len(stages)}"
             run()
             progress(done, len(stages))
+    return compiled.kernels
 
 
 def _stages() -> Iterator[Callable[[], object]]:

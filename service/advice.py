@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,21 +17,26 @@ from pns_common.report import LevelReport
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
 # From this share of bent edges that stay sharp on, a shape looks faceted.
-MANY_SHARP = 0.25
-# Degrees, offered for a rounder shape where it keeps at most this share of what stays sharp now.
-ANGLE = 40
-FEWER = 0.75
+MANY_SHARP = 0.5
+# Degrees. The first is offered that keeps at most this share of what stays sharp now.
+ANGLES = range(40, 180, 20)
+FEWER = 0.5
 # From this share of borders on, faces do not hang together.
 MOST_OPEN = 0.9
 
 
 @dataclass(frozen=True)
 class Bends:
-    """Number of bent edges of a control mesh, of those kept sharp, of those beyond ANGLE."""
+    """Number of bent edges of a control mesh, of those kept sharp, of those beyond each angle."""
 
     bent: int = 0
     sharp: int = 0
-    steep: int = 0
+    steep: tuple[int, ...] = (0,) * len(ANGLES)
+
+    def __add__(self, other: Bends) -> Bends:
+        """Count the edges of both."""
+        steep = tuple(map(operator.add, self.steep, other.steep))
+        return Bends(self.bent + other.bent, self.sharp + other.sharp, steep)
 
 
 NO_BENDS = Bends()
@@ -49,13 +55,15 @@ def count_bends(
     topology = mesh.topology()
     cosines = edge_cosines(mesh.vertices, topology)
     bent = np.flatnonzero(cosines < math.cos(BENT))
-    steep = cosines[bent] < math.cos(math.radians(ANGLE))
+    steep = [cosines[bent] < math.cos(math.radians(angle)) for angle in ANGLES]
     sharp = creases.applied_by_name(topology).is_sharp[bent]
     part = np.zeros(len(bent), dtype=np.int64)
     if part_of_face is not None:
         part = part_of_face[topology.half_edges[bent, 0] // 3]
-    counts = (np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp, steep))
-    return [Bends(*each) for each in zip(*counts, strict=True)]
+    counts = [
+        np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp, *steep)
+    ]
+    return [Bends(bent, sharp, tuple(steep)) for bent, sharp, *steep in zip(*counts, strict=True)]
 
 
 def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
@@ -67,12 +75,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     total = creases + sum(edges[kind] for kind in ("interior", "boundary", "irregular"))
     if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
         kept = f"{bends.sharp:,} of {bends.bent:,} bent edges are kept sharp: use"
-        middle = ""
-        if bends.steep <= FEWER * bends.sharp:
-            middle = f" crease=angle:{ANGLE}, which keeps {bends.steep:,}, for a rounder shape, or"
-        return [
-            f"{kept}{middle} crease=off to round everything; pieces that only touch may come apart"
-        ]
+        for angle, steep in zip(ANGLES, bends.steep, strict=True):
+            if 0 < steep <= FEWER * bends.sharp:
+                return [f"{kept} crease=angle:{angle}, which keeps {steep:,}, for a rounder shape"]
+        touching = edges["boundary"] or edges["irregular"]
+        risk = "; gaps may open where pieces touch" if touching else ""
+        return [f"{kept} crease=off to round all of them{risk}"]
     if edges["boundary"] >= MOST_OPEN * total:
         return [
             f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "

@@ -74,15 +74,12 @@ def _settings() -> str:
 
 
 def _kernels() -> str:
-    from pns_common.progress import compiling
-
     from .warming import warm_up
 
     began = time.perf_counter()
-    with compiling(partial(print, file=sys.stderr, flush=True)) as compiled:
-        warm_up(lambda _: None)
+    compiled = warm_up(partial(print, file=sys.stderr, flush=True))
     seconds = f"ready after {time.perf_counter() - began:.1f} s"
-    return f"{seconds}, {compiled.kernels} compiled" if compiled.kernels else seconds
+    return f"{seconds}, {compiled} compiled" if compiled else seconds
 
 
 def _providers() -> str:

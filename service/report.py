@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
 from pns_common.schemes import Scheme
 
-from .advice import Bends, advice_on
+from .advice import NO_BENDS, Bends, advice_on
 from .errors import shortened, shortened_pointer
 
 # For changes that begin so: whether they are harmless, or what to do.
@@ -96,7 +96,7 @@ def build_report(
         total_level([report["levels"][level] for report in refined])
         for level in range(levels if refined else 0)
     ]
-    bends = Bends(*(sum(each) for each in zip(*(astuple(r.bends) for r in results), strict=True)))
+    bends = sum((result.bends for result in results), NO_BENDS)
     return {
         "scheme": scheme.name,
         "base": scheme.base.name,

@@ -1,9 +1,10 @@
-"""Compile or load the kernels that files need, beside those of pns_common."""
+"""Compile or load all kernels, those that files need too: ``python -m service.warming``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,15 +18,20 @@ from .meshfiles.mesh_file import COLOUR, Layer, of_triangles
 from .options import Limits, Options
 
 
-def warm_up(announce: Callable[[str], None]) -> None:
-    """Run every kernel once, so that no job waits for a compiler; `announce` as in pns_common."""
-    warm_up_library(announce)
+def warm_up(announce: Callable[[str], None]) -> int:
+    """Run every kernel once, so that no job waits for a compiler; `announce` as in pns_common.
+
+    Returns the number of kernels that were compiled.
+    """
     file, model = _rigged(), load_model()
-    for options in (
-        Options(),
-        Options(levels=1, limit=True, normals="limit", uv="smooth", weld_tolerance=0.001),
-    ):
-        subdivide_gltf(file, "glb", options, model, Limits())
+    files = [
+        partial(subdivide_gltf, file, "glb", options, model, Limits())
+        for options in (
+            Options(),
+            Options(levels=1, limit=True, normals="limit", uv="smooth", weld_tolerance=0.001),
+        )
+    ]
+    return warm_up_library(announce, more=files)
 
 
 def _rigged() -> bytes:
@@ -43,3 +49,7 @@ def _rigged() -> bytes:
     }
     layers = {name: Layer(value, mesh.corners) for name, value in values.items()}
     return triangles_glb(replace(mesh, layers={**mesh.layers, **layers}))
+
+
+if __name__ == "__main__":
+    warm_up(partial(print, flush=True))

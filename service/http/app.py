@@ -98,9 +98,9 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        if keys is None:
+        if keys is None and not is_loopback(settings.host):
             log.warning("open to everybody: no PNS_KEYS_FILE is set")
-        else:
+        elif keys is not None:
             log.info("open to the bearers of %d keys", len(keys))
         if not settings.proxies and not is_loopback(settings.host):
             log.warning(

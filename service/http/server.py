@@ -22,6 +22,7 @@ from .. import log_lines
 from ..errors import NoModelError
 from ..settings import Settings, StartError
 from ..workers.jobs import hold_model
+from .access.origins import is_loopback
 from .admission import Admission
 from .app import create_app
 from .watch.metrics import Metrics, scrapes
@@ -146,6 +147,10 @@ class DrainingServer(PromptServer):
             for listening in server.sockets:
                 with listening.dup() as same:
                     same.listen(WAITING)
+                # A line for people, who look for the address among log lines.
+                if is_loopback(self.config.host):
+                    at = f"[{self.config.host}]" if ":" in self.config.host else self.config.host
+                    print(f"Open http://{at}:{listening.getsockname()[1]}", flush=True)
 
     async def serve(self, sockets: list[socket.socket] | None = None) -> None:
         """Serve, with another server beside this one for as long."""

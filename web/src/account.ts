@@ -1,12 +1,11 @@
 /** Fill the panel: what a result's report and file say, and what is measured on it. */
 
 import { isAbort } from "./api/problem";
-import { dihedrals } from "./measure/dihedral";
-import { distances, largestLength, rounding } from "./measure/distance";
+import { distances, distanceFrom, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/promises";
 import type { Result } from "./result";
-import { NAMES } from "./settings";
+import { NAMES, type Settings } from "./settings";
 import type { Source } from "./tasks";
 import {
   showAdvice,
@@ -17,6 +16,7 @@ import {
   showValidation,
   type Before,
 } from "./ui/results";
+import type { Model } from "./view/model";
 import { compare } from "./validate/compare";
 import { validate } from "./validate/validate";
 
@@ -35,19 +35,21 @@ const STAGES: Record<string, string> = {
   opening: "Opening the result",
 };
 
+const moves = new WeakMap<Model, number | null>();
 let validation = new AbortController();
 /** Facts of the file that is shown. */
 let facts: { source: Source; before: Before } | null = null;
 
 /** Show all that does not need the classic side. */
-export function describe(ours: Result, source: Source, scale: Scale): void {
+export function describe(
+  ours: Result, source: Source, scale: Scale, set: (settings: Partial<Settings>) => void,
+): void {
   const milliseconds = performance.now() - ours.began;
-  certify(ours, null, scale);
+  certify(ours, source, null, scale);
   if (facts?.source !== source) facts = { source, before: before(source) };
-  const sharpest = (): number => dihedrals(ours.model).max;
-  showStatistics(facts.before, ours.report, ours.bytes.byteLength, sharpest);
+  showStatistics(facts.before, ours.report, ours.bytes.byteLength);
   showChanges(ours.report);
-  showAdvice(ours.report);
+  showAdvice(ours.report, set);
   showTimings([
     ...ours.timings.map(([name, ms]): [string, number] => [STAGES[name] ?? name, ms / 1000]),
     ["From request to picture", milliseconds / 1000],
@@ -55,17 +57,28 @@ export function describe(ours: Result, source: Source, scale: Scale): void {
   void validateBoth(ours, source);
 }
 
-/** Show what is certain of the distance to the classic rule; returns it in a sentence. */
-export function certify(ours: Result, loop: Result | null, scale: Scale): string {
-  return showPromises(ours.report, lengths(ours, loop, scale));
+/** Show what is certain of a result; returns it in a sentence. */
+export function certify(ours: Result, source: Source, loop: Result | null, scale: Scale): string {
+  return showPromises(ours.report, lengths(ours, source, loop, scale));
 }
 
-function lengths({ model, report, classic }: Result, loop: Result | null, { size, unit }: Scale): Lengths {
+/** How far a result has moved from the file, measured once. */
+function movedBy({ model, report, classic }: Result, { model: file, opened }: Source): number | null {
+  // Halves of quads that were joined again are counted otherwise.
+  if ((classic === "catmull-clark") !== opened.polygons) return null;
+  const known = moves.get(model);
+  const moved = known === undefined ? distanceFrom(file, model, report.levels.length) : known;
+  moves.set(model, moved);
+  return moved;
+}
+
+function lengths(ours: Result, source: Source, loop: Result | null, { size, unit }: Scale): Lengths {
+  const { model, report, classic } = ours;
   const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
   const measured = loop && distances(model, loop.model);
   return {
-    proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0) ?? 0,
-    allowed: largestLength(model, (index) => ofMesh.get(index)?.limit_distance_bound),
+    proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0),
+    moved: movedBy(ours, source),
     measured: measured && measured.max,
     rounding: rounding(model),
     size,
@@ -83,7 +96,6 @@ function before({ upload, opened, model }: Source): Before {
     vertices,
     bytes: upload.bytes,
     surface: surfaceOf(model.meshes),
-    sharpest: dihedrals(model).max,
   };
 }
 

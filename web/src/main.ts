@@ -29,17 +29,25 @@ let choices = 0;
 let awaiting: Result | null = null;
 /** The example that the page shows of itself. */
 let example: Upload | null = null;
+/** The file whose settings were changed last. */
+let tuned = "";
 
 const stage = new Stage(() => void fetchValues(), remember);
 
 const session = new Session({
-  progress: showProgress,
+  progress: (progress, what) => {
+    // The user has uploaded nothing yet.
+    const isSilent = session.source?.upload === example && ["upload", "queue"].includes(progress.step);
+    showProgress(isSilent ? { step: "refine", share: null } : progress, what);
+  },
   opened: (source) => {
     const { upload, opened } = source;
     document.body.classList.remove("empty", "refined");
     document.body.classList.toggle("example", upload === example);
     element("advice").hidden = true;
+    form.rigged = source.model.meshes.some((mesh) => "isSkinnedMesh" in mesh);
     form.fit(opened.split);
+    sayKept();
     fileList.show(upload);
     offerFormatOf(upload);
     stage.open(source);
@@ -48,13 +56,13 @@ const session = new Session({
   refined: (ours) => {
     stage.refine(ours, session.loop);
     document.body.classList.add("refined");
-    if (session.source) describe(ours, session.source, stage);
+    if (session.source) describe(ours, session.source, stage, (deed) => restore({ ...form.asked.wanted, ...deed }));
   },
   compared: (loop) => {
-    const { ours } = session;
-    if (!ours) return;
+    const { ours, source } = session;
+    if (!ours || !source) return;
     stage.refine(ours, loop);
-    announce(`Done. ${certify(ours, loop, stage)}`);
+    announce(`Done. ${certify(ours, source, loop, stage)}`);
   },
   stayed: (ours) => {
     changed.cancel();
@@ -91,7 +99,7 @@ const session = new Session({
 
 const given = fromHash(location.hash);
 const changed = debounced(300, () => {
-  remember();
+  tune();
   clear();
   void session.again(form.asked);
 });
@@ -170,9 +178,22 @@ function clear(): void {
 function restore(wanted: Settings): void {
   changed.cancel();
   form.want(wanted);
-  remember();
+  tune();
   clear();
   void session.again(form.asked);
+}
+
+/** Note for which file the settings were chosen. */
+function tune(): void {
+  tuned = session.source?.upload.name ?? "";
+  sayKept();
+  remember();
+}
+
+/** Say where settings come from that are not the defaults. */
+function sayKept(): void {
+  const name = session.source?.upload.name;
+  element("kept-text").textContent = tuned && tuned !== name ? `Settings kept from ${tuned}` : "Settings changed";
 }
 
 /** Fetch the values at vertices, which a plain result does not hold. */

@@ -41,7 +41,7 @@ export const DEFAULTS: Settings = {
   budget: null,
   limit: false,
   crease: "auto",
-  angle: 40,
+  angle: 60,
   uv: "linear",
   weld: false,
   polygons: false,

@@ -95,6 +95,7 @@ describe("controls", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await choose(page, example);
     await settled(page);
     await page.selectOption("#levels", "1");
+    await page.click(".more summary");
     await page.selectOption("#model", "loop");
     await page.selectOption("#look", "zebra");
     await page.focus("#canvas");

@@ -108,7 +108,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   for (const [name, buffer, words] of [
     ["empty.glb", Buffer.alloc(0), /^The file is empty/],
     ["mesh.zip", zipped, /^No glTF in this archive.*a\.obj/],
-    ["text.txt", Buffer.from("hello"), /^No mesh among these files/],
+    ["text.txt", Buffer.from("hello"), /^Format not supported/],
   ]) {
     test(`${name} gets words of the page, and no other try`, async () => {
       const page = await visit();

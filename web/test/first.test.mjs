@@ -3,7 +3,8 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
-import { BLUNT, CUBE, CUBE_OF_TRIANGLES } from "./support/solids.mjs";
+import { positions } from "./support/glb.mjs";
+import { CUBE, CUBE_OF_TRIANGLES } from "./support/solids.mjs";
 import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
 describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
@@ -91,32 +92,32 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(await page.textContent("#label-right"), /· 16 faces/);
   });
 
-  test("the page says why little changed, and its word for what to do is a setting's", async () => {
+  test("the page says why little changed, and a button does what helps", async () => {
     const page = await visit();
     await choose(page, CUBE);
     await settled(page);
     const advice = await page.textContent("#advice");
-    assert.match(advice, /12 of 12 bent edges are kept sharp: choose Sharp edges: None/);
-    const settings = await page.$$eval("#settings label", (labels) => labels.map(({ textContent }) => textContent));
-    const choices = await page.$$eval("#crease option", (options) => options.map(({ text }) => text));
-    assert.ok(settings.includes("Sharp edges") && choices.some((text) => text.startsWith("None")));
-    await page.selectOption("#crease", "off");
+    assert.match(advice, /^\s*12 of 12 bent edges are kept sharp\s+Round all edges\s*$/);
+    await page.click("#advice-do");
+    assert.equal(await page.inputValue("#crease"), "off");
     await page.locator("#advice").waitFor({ state: "hidden" });
   });
 
-  test("an angle that keeps fewer edges is offered first, in the words of its settings", async () => {
+  test("an angle that keeps half of the edges is offered before none", async () => {
     const page = await visit({ hash: "#levels=1&crease=angle&angle=5" });
-    // A prism of sixteen sides: its rims bend by 90 degrees, its other edges by 22.
+    // A prism of sixteen sides, two storeys high: its rims bend by 90 degrees, its upright edges by 22.
     const around = [...Array(16).keys()];
-    const corners = around.flatMap((i) => [0, 1].map((z) => `v ${Math.cos((i * Math.PI) / 8)} ${Math.sin((i * Math.PI) / 8)} ${z}`));
-    const sides = around.map((i) => [2 * i, 2 * ((i + 1) % 16), 2 * ((i + 1) % 16) + 1, 2 * i + 1]);
-    const ends = [[...around].reverse().map((i) => 2 * i), around.map((i) => 2 * i + 1)];
+    const corners = around.flatMap((i) => [0, 1, 2].map((z) => `v ${Math.cos((i * Math.PI) / 8)} ${Math.sin((i * Math.PI) / 8)} ${z}`));
+    const sides = around.flatMap((i) => [0, 1].map((z) => [3 * i + z, 3 * ((i + 1) % 16) + z, 3 * ((i + 1) % 16) + z + 1, 3 * i + z + 1]));
+    const ends = [[...around].reverse().map((i) => 3 * i), around.map((i) => 3 * i + 2)];
     const faces = [...sides, ...ends].map((face) => `f ${face.map((v) => v + 1).join(" ")}`);
     await choose(page, { name: "prism.obj", mimeType: "", buffer: Buffer.from([...corners, ...faces, ""].join("\n")) });
     await settled(page);
     const advice = await page.textContent("#advice");
-    assert.match(advice, /48 of 48 bent edges are kept sharp: choose Sharp edges: By angle, above 40°, which keeps 32/);
-    assert.equal(await page.textContent("label[for=angle]"), "Angle above");
+    assert.match(advice, /64 of 64 bent edges are kept sharp\s+Make it rounder: keep 32/);
+    await page.click("#advice-do");
+    assert.equal(await page.inputValue("#angle"), "40");
+    await page.locator("#advice", { hasText: "32 of 64" }).waitFor();
   });
 
   test("faces that only touch are told of, and joined by the setting that is named", async () => {
@@ -125,11 +126,10 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1.00001 0 0\nv 0 1.00001 0\nv 1 1 1\nf 1 2 3\nf 4 6 5\n";
     await choose(page, { name: "gap.obj", mimeType: "", buffer: Buffer.from(text) });
     await settled(page);
-    assert.match(await page.textContent("#advice"), /switch on Close small gaps/);
     const boundary = () => page.textContent("#statistics tr:has-text('Boundary edges') td:last-child");
     assert.equal(await boundary(), "6");
-    await page.click(".more summary");
-    await page.check("#weld");
+    assert.equal(await page.textContent("#advice-do"), "Close small gaps");
+    await page.click("#advice-do");
     await page.waitForFunction(() => document.querySelector("#statistics").textContent.includes("Boundary edges64"));
   });
 
@@ -174,6 +174,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await choose(page, example);
     await settled(page);
     assert.ok(Number(await page.getAttribute("#legend", "data-max")) > 0);
+    await page.click(".more summary");
     const asked = page.waitForRequest(/budget=0(&|$)/);
     await page.fill("#strength", "0");
     await asked;
@@ -182,8 +183,9 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
   });
 
-  test("each model is described in a sentence", async () => {
+  test("each rule is described in a sentence", async () => {
     const page = await visit();
+    await page.click(".more summary");
     await page.locator("#strength:enabled").waitFor();
     const names = await page.$$eval("#model option", (options) => options.map(({ value, text }) => [value, text]));
     for (const [value, text] of names) {
@@ -193,17 +195,20 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }
   });
 
-  test("the opening camera looks at the front, +Z", async () => {
-    const page = await visit({ hash: "#levels=1&layout=single&look=clay&crease=angle&angle=20" });
-    await choose(page, BLUNT);
+  test("the opening camera looks at the front, +Z, from thirty degrees beside it and a little above", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    await choose(page, CUBE);
     await settled(page);
-    // The small side is in front of the large one: all around it its flanks are seen.
-    const { width, height, data } = await picture(page);
-    const shade = (x, y) => data[4 * (Math.round(y * height) * width + Math.round(x * width))];
-    const middle = shade(0.5, 0.48);
-    for (const [x, y] of [[0.4, 0.48], [0.6, 0.48], [0.5, 0.33], [0.5, 0.63]]) {
-      assert.ok(Math.abs(shade(x, y) - middle) > 2, `the front reaches to ${x}, ${y}`);
-    }
+    // A zoom keeps the direction, and writes the camera into the address.
+    await page.press("#canvas", "-");
+    await page.waitForFunction(() => location.hash.includes("camera"));
+    const place = await page.evaluate(() => new URLSearchParams(location.hash.slice(1)).get("camera"));
+    const [x, y, z, ...target] = place.split(",").map(Number);
+    assert.ok(Math.hypot(...target) < 1e-3);
+    const degrees = (radians) => (radians * 180) / Math.PI;
+    assert.ok(Math.abs(degrees(Math.atan2(x, z)) - 30) < 1, place);
+    const above = degrees(Math.atan2(y, Math.hypot(x, z)));
+    assert.ok(above > 10 && above < 25, place);
   });
 
   test("a heat map keeps its colours for 98 of 100 vertices, and names the largest value", async () => {
@@ -269,11 +274,43 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(await focused(), "levels");
   });
 
+  test("how far the result leaves the file is told in per cent of its size", async () => {
+    const page = await visit({ hash: "#levels=1&crease=off" });
+    await choose(page, CUBE);
+    await settled(page);
+    const [places] = positions(await refined("levels=1&normals=smooth&crease=off", CUBE.buffer, "model/obj"));
+    const points = Array.from({ length: places.length / 3 }, (_, i) => places.subarray(3 * i, 3 * i + 3));
+    const apart = Math.max(...points.map((point) => {
+      const beyond = [...point].map((x) => Math.abs(x) - 0.5);
+      const deepest = Math.max(...beyond);
+      return deepest > 0 ? Math.hypot(...beyond.map((x) => Math.max(x, 0))) : -deepest;
+    }));
+    const [, told] = /than ([\d.]+)\u00a0% of its size/.exec(await page.textContent("#promises"));
+    assert.equal(told, String(Number(((100 * apart) / Math.sqrt(3)).toPrecision(2))));
+  });
+
+  test("settings stay for the next file, which says so and where they come from", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await page.evaluate(() => (location.hash = ""));
+    await choose(page, CUBE);
+    await settled(page);
+    assert.ok(await page.isHidden("#kept"));
+    await page.selectOption("#crease", "off");
+    await page.locator("#kept", { hasText: "Settings changed" }).waitFor();
+    await page.waitForFunction(() => location.hash.includes("crease=off"));
+    await choose(page, TETRAHEDRON);
+    await settled(page);
+    assert.match(await page.textContent("#kept"), /Settings kept from cube\.obj\s+Reset/);
+    await page.click("#reset");
+    assert.ok(await page.isHidden("#kept"));
+    assert.equal(await page.inputValue("#crease"), "auto");
+    await settled(page);
+  });
+
   test("lengths are in per cent of the model's size first, and the file's unit second", async () => {
     const page = await visit({ hash: "#levels=1&look=distance" });
     await choose(page, example);
     await settled(page);
-    assert.match(await page.textContent("#promises"), /than [\d.]+\u00a0% of the model’s size \([\d.]+\u00a0c?m\)/);
     assert.match(await page.textContent("#legend-high"), /[\d.]+\u00a0% \([\d.]+\u00a0[cm]?m\)$/);
     assert.match(await page.textContent("#label-left"), new RegExp(number(PART_FACES)));
   });

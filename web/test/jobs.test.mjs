@@ -115,7 +115,7 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     const page = await visit({ hash: "#levels=1&look=ratio" });
     await choose(page, example);
     await settled(page);
-    await page.locator("#legend", { hasText: "Share of its limit used" }).waitFor();
+    await page.locator("#legend", { hasText: "Share of the bound used" }).waitFor();
     await page.selectOption("#look", "distance");
     await page.locator("#legend", { hasText: "Distance to classic" }).waitFor();
     await page.selectOption("#pair", "loop");
@@ -177,6 +177,7 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     const refusal = { title: "A parameter is out of range", detail: "No.", parameter: "budget", status: 422 };
     await page.route(/\/jobs\?/, (route) => route.fulfill({ status: 422, json: refusal }));
+    await page.click(".more summary");
     await page.fill("#strength", "150");
     await page.locator("#problem-pointer", { hasText: "budget" }).waitFor();
     assert.equal(await page.inputValue("#strength"), "100");

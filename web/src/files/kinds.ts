@@ -12,7 +12,10 @@ export const MEDIA_TYPES: Record<Kind, string> = {
   off: "model/off",
 };
 
+/** Other endings of a kind. */
+export const ALIASES: Record<string, Kind> = { vrm: "glb" };
+
 export function kindOf(name: string): Kind | null {
   const extension = /\.([^./]+)$/.exec(name)?.[1]?.toLowerCase() ?? "";
-  return extension in MEDIA_TYPES ? (extension as Kind) : null;
+  return extension in MEDIA_TYPES ? (extension as Kind) : (ALIASES[extension] ?? null);
 }

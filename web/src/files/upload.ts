@@ -4,7 +4,7 @@ import type { Body } from "../api/jobs";
 import { fileProblem } from "../api/problem";
 import { listed } from "../report/format";
 import { filesNamedIn } from "./gltf";
-import { kindOf, MEDIA_TYPES, type Kind } from "./kinds";
+import { ALIASES, kindOf, MEDIA_TYPES, type Kind } from "./kinds";
 import { shortest } from "./path";
 
 /** A file with the folder that it came in. */
@@ -45,10 +45,11 @@ export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
     .filter((file): file is PathedFile & { kind: Kind } => file.kind !== null)
     .sort((a, b) => ORDER.indexOf(a.kind) - ORDER.indexOf(b.kind) || depth(a) - depth(b));
   if (!documents.length) {
-    const names = listed(given.map(({ file }) => file.name)) || "nothing";
+    const names = listed(given.map(({ file }) => file.name)) || "Nothing";
+    const kinds = [...ORDER, ...Object.keys(ALIASES)].map((kind) => `.${kind}`);
     throw fileProblem(
-      "No mesh among these files",
-      `${names}: the page takes ${ORDER.map((kind) => `.${kind}`).join(", ")}.`,
+      "Format not supported",
+      `${names}: the page takes ${kinds.join(", ")}. In Blender, choose File, Export, glTF 2.0: it writes a .glb.`,
     );
   }
   const used = new Set(documents.map(({ path }) => path));

@@ -44,11 +44,6 @@ export function length(value: number, unit: Unit): string {
   return measure(figure(value / scale), name);
 }
 
-/** Write a length as a share of the model's size, then in the file's unit. */
-export function lengthOf(value: number, size: number, unit: Unit): string {
-  return `${percent(value / size)} of the model’s size (${length(value, unit)})`;
-}
-
 export function percent(share: number): string {
   if (share === 0) return measure(0, "%");
   const value = 100 * share;

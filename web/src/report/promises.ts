@@ -1,6 +1,6 @@
 /** Three promises that a report proves of a result, in plain words, and the mathematics behind them. */
 
-import { counted, length, lengthOf, percent, type Unit } from "./format";
+import { counted, length, percent, type Unit } from "./format";
 import { isLearned, largestRatio, sharpEdges, type Report } from "./report";
 
 export interface Promised {
@@ -15,8 +15,8 @@ export interface Promised {
 export interface Lengths {
   /** The largest distance of the limit surface from the classic rule's, as the report proves it. */
   proved: number;
-  /** The distance that the budget and the creases allow; null where the report has no such bound. */
-  allowed: number | null;
+  /** The largest distance of a refined vertex from the user's own model; null where it cannot be told. */
+  moved: number | null;
   /** The largest distance between a vertex and its counterpart by the classic rule; null until that side is there. */
   measured: number | null;
   /** The possible error of `measured`. */
@@ -35,37 +35,41 @@ export function promises(report: Report, lengths: Lengths): Promised[] {
   }
   const learned = isLearned(report);
   return [
-    learned ? closeness(report, lengths) : classic(lengths),
-    folding(report, lengths),
-    ...(learned ? [flatness(report, lengths)] : []),
+    ...(learned
+      ? [closeness(report, lengths), folding(report, lengths), flatness(report, lengths)]
+      : [classic(lengths)]),
   ];
 }
 
-function classic({ proved, size, unit, rule }: Lengths): Promised {
-  const kept = proved ? ` Sharp edges keep it at most ${lengthOf(proved, size, unit)} from ${rule}’s smooth rule.` : "";
+function movedBy({ moved, size }: Lengths): string {
+  return moved === null ? "" : `No point is farther from your model than ${percent(moved / size)} of its size.`;
+}
+
+function classic(lengths: Lengths): Promised {
+  const { proved, unit, rule } = lengths;
+  const kept = proved ? ` Sharp edges keep it within ${length(proved, unit)} of the surface without them.` : "";
   return {
     holds: true,
     title: "Classic",
-    text: `This is ${rule}’s classic rule: nothing learned took part.${kept}`,
-    mathematics: `Distance to ${rule}’s limit surface with the same creases: ${length(0, unit)}.`,
+    text: `This is ${rule}’s classic rule: nothing learned took part. ${movedBy(lengths)}`.trim(),
+    mathematics: `Distance to ${rule}’s limit surface with the same creases: ${length(0, unit)}.${kept}`,
   };
 }
 
 function closeness(report: Report, lengths: Lengths): Promised {
-  const { proved, allowed, measured, rounding, size, unit, rule } = lengths;
+  const { proved, measured, rounding, size, unit, rule } = lengths;
   const used = Math.max(...report.levels.map(largestRatio));
   const most = proved * 1.001 + 1e-6 * size;
-  const bound = allowed === null ? "" : ` The budget and the creases would allow ${length(allowed, unit)}.`;
   // Without this remark the two numbers would seem to disagree.
   const rounded = measured !== null && measured > most ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
   const apart = measured === null ? "" : ` Measured between the refined vertices: ${length(measured, unit)}${rounded}.`;
-  const sharp = report.levels.some(sharpEdges) ? ", kept sharp edges included" : "";
+  const sharp = report.levels.some(sharpEdges) ? ", which rounds sharp edges too" : "";
   return {
     holds: (measured === null || measured <= most + rounding) && used <= 1 + 1e-12,
     title: "Stays close",
-    text: `No point is farther from the classic smooth surface than ${lengthOf(proved, size, unit)}${sharp}.`,
+    text: movedBy(lengths) || "How close is proved: see the mathematics.",
     mathematics:
-      `Every point of the limit surface is within ${length(proved, unit)} of ${rule}’s.${bound}${apart} ` +
+      `Every point of the limit surface is within ${length(proved, unit)} of ${rule}’s${sharp}.${apart} ` +
       `Each vertex may leave its place by ${rule}’s rule by C h² / R at most, whatever the model says; ` +
       `at most ${percent(Math.min(used, 1))} of that was used.`,
   };
@@ -77,10 +81,10 @@ function folding(report: Report, { rule }: Lengths): Promised {
   const kept = guarded ? ` The guard shortened ${counted(guarded, "correction")} to keep it so.` : "";
   return {
     holds: turned === 0,
-    title: "Does not fold",
+    title: "Adds no folds",
     text: turned
       ? `${counted(turned, "face")} turned over: look at the wireframe there.`
-      : "No face is turned over.",
+      : "The learned rule turns no face over.",
     mathematics:
       `${turned ? counted(turned, "face") : "No face"} at any level points away from its counterpart by ${rule}’s rule ` +
       `with the same creases.${kept}`,
@@ -92,7 +96,7 @@ function flatness(report: Report, { rule }: Lengths): Promised {
   return {
     holds: true,
     title: "Flat stays flat",
-    text: "Level areas stay level: the learned rule acts only where the surface bends.",
+    text: "A face whose neighbours lie in its plane stays in it. Beside an edge it may bulge a little.",
     mathematics:
       `By construction: where neighbouring faces are coplanar the gate γ of each correction is 0, and the vertices are ${rule}’s; ` +
       "boundaries and creases may bend within their plane. " +

@@ -14,7 +14,6 @@ export interface Level {
   flipped_faces: number;
   proximity_ratio: Summary;
   gate: Summary & { active: number };
-  normal_jump_max: number;
   guarded?: number;
   displacement_max?: number;
   vertex_rule?: { proximity_ratio: Summary; gate: Summary };
@@ -45,8 +44,6 @@ export interface MeshReport {
   learned_levels: number;
   /** No point of the limit surface is farther from the classic rule's, in the mesh's own units. */
   limit_distance: number;
-  /** What the budget would have allowed, with what creases keep back; null where it says nothing. */
-  limit_distance_bound: number | null;
 }
 
 /** Whether a model took part. */

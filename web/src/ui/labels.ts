@@ -31,10 +31,10 @@ function labels(
   layout: Layout,
 ): [Label | null, Label | null] {
   const of = ({ report }: Result): string => counted(report.totals.faces, "face");
-  const text = ours ? `${ours.report.model ?? "classic"} · ${of(ours)}` : "";
+  const text = ours ? `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : "Classic"} · ${of(ours)}` : "";
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
   const after = ours && { title: "After", text };
   if (layout === "overlay" || layout === "single") return [null, after ?? before];
-  if (loop && ours) return [{ title: `Classic (${NAMES[loop.classic]})`, text: of(loop) }, { title: "Ours", text }];
+  if (loop && ours) return [{ title: `Classic (${NAMES[loop.classic]})`, text: of(loop) }, { title: "After", text }];
   return [before, after];
 }

@@ -30,6 +30,7 @@ export function bindPanel(actions: Actions): void {
   element("fold").addEventListener("click", () => {
     const folded = document.body.classList.toggle("folded");
     element("fold").setAttribute("aria-expanded", String(!folded));
+    element("fold").textContent = folded ? "Show settings" : "Hide settings";
   });
   element("share").addEventListener("click", () => void share(actions));
 }

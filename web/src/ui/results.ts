@@ -1,10 +1,11 @@
 /** The account of a result: promises, advice, statistics, changes, validator, timings. */
 
 import type { Comparison } from "../validate/compare";
-import { angle, bytes, count, figure, seconds } from "../report/format";
+import { bytes, count, figure, listed, seconds } from "../report/format";
 import type { Surface } from "../measure/surface";
 import { promises, type Lengths } from "../report/promises";
 import { sharpEdges, type Report } from "../report/report";
+import type { Settings } from "../settings";
 import { element, make } from "./dom";
 
 /** Show the promises; returns them in one sentence. */
@@ -38,25 +39,29 @@ export function showPromises(report: Report, lengths: Lengths): string {
   return promised.map(({ title, text }) => `${title}: ${text}`).join(" ");
 }
 
-/** The settings that advice may name: the service's options, and the page's words. */
-const WORDS: [RegExp, string][] = [
-  [/\buse crease=angle:(\d+)/, "choose Sharp edges: By angle, above $1°"],
-  [/\b(use )?crease=off/, "choose Sharp edges: None"],
-  [/\buse normals=smooth/, "choose Shading: Smooth"],
-  [/\buse weld_tolerance=[\d.]+/, "switch on Close small gaps"],
+/** What a hint asks for, as the service spells it: the button's words, and the settings. */
+const DEEDS: [RegExp, string, (value: string) => Partial<Settings>][] = [
+  [/use crease=angle:(\d+), which keeps ([\d,]+), for a rounder shape/, "Make it rounder: keep $2", (angle) => ({ crease: "angle", angle: Number(angle) })],
+  [/use crease=off to round all of them/, "Round all edges", () => ({ crease: "off" })],
+  [/use normals=smooth/, "Smooth shading", () => ({ normals: "smooth" })],
+  [/use weld_tolerance=[\d.]+( to join vertices that nearly coincide)?/, "Close small gaps", () => ({ weld: true })],
 ];
 
-/** Say it in the page's own words for the settings. */
-function inOurWords(text: string): string {
-  return WORDS.reduce((said, [option, word]) => said.replace(option, word), text);
-}
-
-/** Show why little changed. */
-export function showAdvice({ advice = [] }: Report): void {
-  element("advice").hidden = !advice.length;
-  element("advice").replaceChildren(
-    ...advice.map((text) => make("li", { textContent: inOurWords(text) })),
-  );
+/** Show the first thing that the user should know or do, and a button that does it. */
+export function showAdvice(report: Report, set: (settings: Partial<Settings>) => void): void {
+  const asked = changesOf(report).filter(({ hint }) => DEEDS.some(([use]) => use.test(hint)));
+  const [text] = [...(report.advice ?? []), ...asked.map(({ text }) => text)];
+  element("advice").hidden = !text;
+  if (!text) return;
+  const deed = DEEDS.find(([use]) => use.test(text));
+  const [use, label, settings] = deed ?? [/$/, "", () => ({})];
+  const found = use.exec(text)!;
+  const said = [text.slice(0, found.index), text.slice(found.index + found[0].length)];
+  element("advice-text").textContent = said.map((part) => part.replace(/^[\s,:;]+|[\s,:;]+$/g, "")).filter(Boolean).join("; ");
+  const button = element<HTMLButtonElement>("advice-do");
+  button.hidden = !deed;
+  button.textContent = found[0].replace(use, label);
+  button.onclick = () => set(settings(found[1] ?? ""));
 }
 
 export interface Before {
@@ -64,14 +69,9 @@ export interface Before {
   vertices: number;
   bytes: number;
   surface: Surface;
-  /** Degrees. */
-  sharpest: number;
 }
 
-/** Show the table. `sharpest` is called where creases are left out of the report's largest turn. */
-export function showStatistics(
-  before: Before, report: Report, size: number, sharpest: () => number,
-): void {
+export function showStatistics(before: Before, report: Report, size: number): void {
   const last = report.levels.at(-1);
   const { surface } = before;
   const rows: [string, string, string][] = [
@@ -81,12 +81,10 @@ export function showStatistics(
   ];
   if (last) {
     const sharp = sharpEdges(last);
-    const after = sharp ? sharpest() : (last.normal_jump_max * 180) / Math.PI;
     rows.push(
       ["Vertices of the surface", count(surface.vertices), count(last.vertices)],
       ["Boundary edges", count(surface.boundary), count(last.edges.boundary)],
       ["Irregular edges", count(surface.irregular), count(last.edges.irregular)],
-      ["Sharpest edge", angle(before.sharpest), angle(after)],
       ["Faces turned over", "–", count(report.levels.reduce((n, l) => n + l.flipped_faces, 0))],
     );
     if (sharp) rows.push(["Sharp edges", "–", count(sharp)]);
@@ -101,27 +99,48 @@ export function showTimings(rows: [string, number][]): void {
   );
 }
 
+interface ListedChange {
+  /** What was changed, how often, and what to do. */
+  text: string;
+  hint: string;
+  where: string;
+}
+
+/** Everything that was changed or lost, each thing once. */
+function changesOf(report: Report): ListedChange[] {
+  const changes = new Map<string, Report["changes"]>();
+  for (const change of report.changes) changes.set(change.what, [...(changes.get(change.what) ?? []), change]);
+  for (const [name, count] of Object.entries(report.dropped)) {
+    const what = `${name.replaceAll("_", " ")} dropped`;
+    if (count && !changes.has(what)) changes.set(what, [{ pointer: "", what, count }]);
+  }
+  return [...changes].map(([what, all]) => {
+    const times = all.reduce((sum, { count }) => sum + count, 0);
+    const hint = report.hints?.[what] ?? "";
+    const places = all.map(({ pointer }) => [nameAt(report, pointer), pointer].filter(Boolean).join(", "));
+    return {
+      text: `${times > 1 ? `${count(times)} × ` : ""}${what}${hint && `: ${hint}`}`,
+      hint,
+      where: listed(places.filter(Boolean), 1),
+    };
+  });
+}
+
 export function showChanges(report: Report): void {
-  const said = new Set(report.changes.map(({ what }) => what));
-  const dropped = Object.entries(report.dropped)
-    .map(([name, n]) => ({ pointer: "", what: `${name.replaceAll("_", " ")} dropped`, count: n }))
-    .filter(({ what, count }) => count > 0 && !said.has(what));
-  const all = [...report.changes, ...dropped];
+  const all = changesOf(report);
   element("changes-count").textContent = all.length ? String(all.length) : "none";
   element("changes").replaceChildren(
     ...(all.length
-      ? all.map(({ pointer, what, count: n }) => {
-          const hint = report.hints?.[what];
-          const place = [nameAt(report, pointer), pointer].filter(Boolean).join(", ");
-          return make(
-            "li",
-            {},
-            `${n > 1 ? `${count(n)} × ` : ""}${what}${hint ? `: ${inOurWords(hint)}` : ""}`,
-            ...(place ? [make("span", { className: "where", textContent: place })] : []),
-          );
-        })
+      ? all.map(({ text, where }) =>
+          make("li", {}, inOurWords(text), ...(where ? [make("span", { className: "where", textContent: where })] : [])),
+        )
       : [make("li", { className: "note", textContent: "Nothing beside the geometry changed." })]),
   );
+}
+
+/** Name settings as the page does. */
+function inOurWords(text: string): string {
+  return DEEDS.reduce((said, [use, label]) => said.replace(use, `choose “${label}”`), text);
 }
 
 /** The name of the mesh that a pointer leads to; "" without one. */

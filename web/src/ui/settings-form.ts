@@ -4,7 +4,10 @@ import type { Limits, ModelEntry } from "../api/client";
 import { count } from "../report/format";
 import { DEFAULTS, LOOP, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
-import { describeModel } from "./models";
+import { describeModel, ruleName } from "./models";
+
+/** Faces of a rigged file from which on it is heavy. */
+const HEAVY = 50_000;
 
 export class SettingsForm {
   private models: ModelEntry[] = [];
@@ -15,6 +18,8 @@ export class SettingsForm {
   private settings: Settings;
   /** Faces after one step; 0 where there is no file. */
   private split = 0;
+  /** Whether the file moves by joints: games count its faces. */
+  rigged = false;
 
   constructor(
     wanted: Settings,
@@ -109,14 +114,15 @@ export class SettingsForm {
     );
     select("levels").value = String(settings.levels);
     const closed = this.levels().find((level) => this.refusal(level));
+    const isHeavy = this.rigged && settings.levels > 1 && this.predicted(settings.levels) > HEAVY;
     element("levels-note").textContent = closed && this.wanted.levels >= closed
       ? `${closed} and more: ${this.refusal(closed)} of this service`
-      : "";
+      : isHeavy ? `Many faces for a game: 1 gives ${count(this.predicted(1))}.` : "";
     const bundled = this.models.map((model) =>
-      option(model.default ? "" : model.name, model.name),
+      option(model.default ? "" : model.name, ruleName(model)),
     );
-    if (!bundled.length) bundled.push(option("", "default"));
-    select("model").replaceChildren(...bundled, option(LOOP, "classic"));
+    if (!bundled.length) bundled.push(option("", "Learned"));
+    select("model").replaceChildren(...bundled, option(LOOP, "Classic"));
     select("model").value = settings.model;
     // Before the list is there, a link may name a model of it.
     const isUnknown = select("model").value !== settings.model && this.models.length > 0;
@@ -172,6 +178,7 @@ export class SettingsForm {
     input("strength").value = String(percent);
     input("strength").disabled = settings.model === LOOP || !model;
     element("strength-text").textContent = settings.model === LOOP ? "–" : `${percent} %`;
+    element("kept").hidden = Object.entries(this.wanted).every(([name, value]) => value === DEFAULTS[name as keyof Settings]);
     element("angle-row").hidden = settings.crease !== "angle";
     element("model-note").textContent = describeModel(settings.model === LOOP ? LOOP : model?.name ?? "");
   }

@@ -125,17 +125,17 @@ const DESCRIPTIONS: Record<Heat, (level: number, carried: string, scale: Scale) 
     note: "From the classic surface, in per cent of the model’s size.",
   }),
   ratio: (level, carried) => ({
-    title: "Share of its limit used",
+    title: "Share of the bound used",
     write: (value) => percent(Math.min(value, 1)),
     note: `Of corrections at level ${level}; ${percent(1)} is the bound C h² / R.${carried}`,
   }),
   gate: (level, carried) => ({
-    title: "Where the rule acts",
+    title: "Gate of the rule",
     write: (value) => figure(value),
     note: `The gate γ: 0 on planes, 1 at sharp edges; of level ${level}.${carried}`,
   }),
   dihedral: () => ({
-    title: "Angles between faces",
+    title: "Angles of faces",
     write: angle,
     note: "The largest turn between faces at each vertex.",
   }),

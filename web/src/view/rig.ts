@@ -8,10 +8,10 @@ import type { Extent } from "./model";
 const FARTHEST = 100;
 
 /** The air around a model: how much farther away the camera stands than it has to. */
-const MARGIN = 1.15;
+const MARGIN = 1.08;
 
-/** The front of a glTF is +Z: seen from a little beside and above it shows its depth. */
-const FRONT = new Vector3(0.35, 0.28, 1).normalize();
+/** The front of a glTF is +Z: seen from 30 degrees beside it and a little above it shows its depth. */
+const FRONT = new Vector3(0.5, 0.28, 0.866).normalize();
 
 export class Rig {
   readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
