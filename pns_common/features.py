@@ -79,10 +79,15 @@ class Symmetries:
 
 @dataclass(frozen=True)
 class FeatureGroup:
-    """Features that belong together: one column each, in this order."""
+    """Features that belong together: one column each, in this order.
+
+    Attributes:
+        rings: whether any reads the rings of the ends or wings: mean normals, umbrella heights.
+    """
 
     name: str
     features: tuple[Feature, ...]
+    rings: bool = True
 
 
 @dataclass(frozen=True)
@@ -102,6 +107,20 @@ class FeatureSet:
     def count(self) -> int:
         """K, the number of columns."""
         return len(self.features)
+
+    @cached_property
+    def starts(self) -> tuple[int, ...]:
+        """The first column of each of `EDGE_GROUPS`; −1 for those that the set has not."""
+        starts, column = [-1] * len(EDGE_GROUPS), 0
+        for group in self.groups:
+            starts[EDGE_GROUPS.index(group)] = column
+            column += len(group.features)
+        return tuple(starts)
+
+    @property
+    def rings(self) -> bool:
+        """True where any group reads rings."""
+        return any(group.rings for group in self.groups)
 
     @cached_property
     def symmetries(self) -> Symmetries:
@@ -142,12 +161,14 @@ def _tilts(vertices: str) -> tuple[Feature, ...]:
 
 
 # x = 1 − n1 · n2, and log ‖c − a‖ / h, …
-_CURVATURE = FeatureGroup("curvature", (Feature("x", limit=2.0),))
+_CURVATURE = FeatureGroup("curvature", (Feature("x", limit=2.0),), rings=False)
 _SHAPE = FeatureGroup(
-    "shape", tuple(Feature("log", side, limit=inf) for side in ("ac", "bc", "ad", "bd"))
+    "shape",
+    tuple(Feature("log", side, limit=inf) for side in ("ac", "bc", "ad", "bd")),
+    rings=False,
 )
 # (n1 × n2) · T, positive on a crest.
-_DIHEDRAL = FeatureGroup("dihedral", (Feature("dihedral", turn_over=-1),))
+_DIHEDRAL = FeatureGroup("dihedral", (Feature("dihedral", turn_over=-1),), rings=False)
 _ENDS, _WINGS = FeatureGroup("ends", _tilts("ab")), FeatureGroup("wings", _tilts("cd"))
 # u_v · m_v / h_v, negative on a crest.
 _UMBRELLA = FeatureGroup(
@@ -184,24 +205,21 @@ _FACE = FeatureGroup(
     ),
 )
 
+# In the order of the numbers that `kernels.frames` knows them by.
+EDGE_GROUPS = (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA)
+
 _UNSIGNED, _SIGNED = (HALF_TURN, MIRROR), (HALF_TURN, MIRROR, TURN_OVER)
-_TILTED = (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS)
 PAPER_5 = FeatureSet("paper-5", (_CURVATURE, _SHAPE), _UNSIGNED)
-SIGNED_14 = FeatureSet("signed-14", _TILTED, _SIGNED)
-SIGNED_18 = FeatureSet("signed-18", (*_TILTED, _UMBRELLA), _SIGNED)
+SIGNED_18 = FeatureSet(
+    "signed-18", (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA), _SIGNED
+)
 RING_10 = FeatureSet("ring-10", (_RING,), (RING_TURN_OVER,))
 
 FACE_8 = FeatureSet("face-8", (_FACE,), (RING_TURN_OVER,))
 
 # Sets of edges, old vertices and faces, by the name on a model card.
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
-    {features.name: features for features in (PAPER_5, SIGNED_14, SIGNED_18)}
+    {features.name: features for features in (PAPER_5, SIGNED_18)}
 )
 RING_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({RING_10.name: RING_10})
 FACE_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({FACE_8.name: FACE_8})
-FEATURE_COUNT: Mapping[str, int] = MappingProxyType(
-    {
-        name: seen.count
-        for name, seen in {**FEATURE_SETS, **RING_FEATURE_SETS, **FACE_FEATURE_SETS}.items()
-    }
-)

@@ -43,6 +43,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
 from pns_common.errors import ModelError, ParameterError
+from pns_common.features import FeatureSet
 from pns_common.kernels import children, correction, frames, measures, quads
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
@@ -63,7 +64,7 @@ class Rule:
 
     Attributes:
         edge_network: φ → η or z, at unit budget.
-        feature_count: K of φ.
+        seen: the features φ of edges.
         symmetric: c lies to the left of a → b, so no numbering matters; else in the lower face.
         gate_sharpness: c.
         budget: C.
@@ -79,7 +80,7 @@ class Rule:
     """
 
     edge_network: Network
-    feature_count: int
+    seen: FeatureSet
     symmetric: bool
     gate_sharpness: float
     budget: float
@@ -156,7 +157,7 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     count, edges = len(level.points), mesh.interior
     x = base.place(level.points, mesh, level.blocks)  # x0
     has_prior = rule.prior_strength is not None
-    level.measure(rings=has_prior or rule.feature_count > frames.DIHEDRAL)
+    level.measure(rings=has_prior or rule.seen.rings)
     if not has_prior:
         made = _Rows.starting_with(np.zeros((len(x), 3)))
 
@@ -272,22 +273,24 @@ def edge_inputs(
         rows: the edges.
         opened: `face_gates`, if they are known already.
     """
-    mesh, count, signed = level.topology, len(rows), rule.feature_count > frames.DIHEDRAL
+    mesh, count, seen = level.topology, len(rows), rule.seen
     basis = np.empty((count, 9))
-    features = np.empty((count, rule.feature_count), dtype=rule.feature_type)
+    features = np.empty((count, seen.count), dtype=rule.feature_type)
     (curvature, sides, length, extent), degenerate = np.empty((4, count)), np.empty(count, bool)
     has_prior = rule.prior_strength is not None
-    fields = level.rings.fields if signed else np.zeros((0, measures.FIELDS))
+    fields = level.rings.fields if seen.rings else np.zeros((0, measures.FIELDS))
     if opened is None:
         opened = face_gates(level, rule) if has_prior else level.logs[:0]
     measured = level.points, level.normals, fields, level.edges.lengths, level.logs, opened
     to = basis, curvature, sides, length, extent, degenerate, features
     if mesh.triangles:
         of_mesh = mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges
-        frames.frames_and_features(*measured, *of_mesh, rows, 0, count, rule.symmetric, *to)
+        frames.frames_and_features(
+            *measured, *of_mesh, rows, 0, count, rule.symmetric, seen.starts, *to
+        )
     else:
         of_mesh = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.edges, mesh.half_edges
-        frames.polygon_frames_and_features(*measured, *of_mesh, rows, 0, count, *to)
+        frames.polygon_frames_and_features(*measured, *of_mesh, rows, 0, count, seen.starts, *to)
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     if has_prior:
         # Open on the diagonal of a plane quad too: moving its sides alone would ripple.

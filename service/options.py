@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
+
+from pns_common.scheme_names import BASE_SCHEMES
 
 from .errors import InvalidParameter, check_choice
 
@@ -13,7 +15,10 @@ MAX_LEVELS = 6
 # The library's, without its import (tests hold them equal).
 DEFAULT_LEVELS = 2
 
-SchemeName = Literal["auto", "pns", "loop", "catmull-clark"]
+if TYPE_CHECKING:
+    SchemeName = str
+else:  # A type checker cannot see the names that a table gives.
+    SchemeName = Literal["auto", "pns", *BASE_SCHEMES]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
 NormalRule = Literal["auto", "keep", "smooth", "limit"]

@@ -313,6 +313,7 @@ class GeneralRule:
         boundary_strength: of the prior along boundaries and creases.
         network_scale: τ.
         fold_angle: θ, degrees.
+        features: φ of edges.
     """
 
     edge_network: Network
@@ -324,6 +325,7 @@ class GeneralRule:
     boundary_strength: float
     network_scale: float
     fold_angle: float
+    features: Callable[[Surroundings, EdgeReading, Frames], Tensor] = signed_18
 
     def __call__(
         self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
@@ -344,7 +346,7 @@ class GeneralRule:
         opened = around.gates_beside(self.vertex_gate_sharpness)
         opened = torch.where(frames.degenerate, 0.0, opened)
         edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
-        z = shortened(self.edge_network(signed_18(around, edges, frames)[interior]), one)
+        z = shortened(self.edge_network(self.features(around, edges, frames)[interior]), one)
         local = torch.zeros_like(edges.a).index_put((interior,), z)
         turned = edge_extents(edges)[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
         jump = around.mean(around.turns[0])[:, 0]

@@ -24,8 +24,8 @@ from pns_common.kernels.vectors import (
 ANTIPARALLEL = 1e-6
 # Lengths of zero are read as this, so that every logarithm is finite.
 SHORTEST = 1e-150
-# Feature columns: curvature; four logarithms of side ratios; then those with a sign.
-LOGS, DIHEDRAL, ENDS, WINGS, UMBRELLAS = 1, 5, 6, 10, 14
+# Groups of features, by their place in `features.EDGE_GROUPS`.
+CURVATURE, SHAPE, DIHEDRAL, ENDS, WINGS, UMBRELLA = range(6)
 
 
 @inlined
@@ -71,6 +71,7 @@ def frames_and_features(
     begin,
     end,
     symmetric,
+    starts,
     frames,
     curvature,
     sides,
@@ -82,20 +83,20 @@ def frames_and_features(
     """Write frames and features of the interior edges rows[begin:end]; row 0 is the first of them.
 
     Args:
-        fields: (V, 4) mean normals and umbrella heights; read by signed features alone.
+        fields: (V, 4) mean normals and umbrella heights; (0, 4) where no group reads rings.
         lengths, logs: (E,) lengths and their logarithms.
         opened: (F,) gates of the faces; (0,) where they are not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
+        starts: the first column of each group of features, −1 for none.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
         sides: (N,) out: the smaller gate of both faces, 0 where there is no frame.
         length: (N,) out: h.
         extent: (N,) out: ℓ.
         degenerate: (N,) out: whether the frame is the fallback.
-        features: (N, K) out; K = 5, 14 or 18.
+        features: (N, K) out.
     """
-    width = features.shape[1]
     for i in range(begin, end):
         e, to = rows[i], i - begin
         a, b = edges[e, 0], edges[e, 1]
@@ -121,19 +122,12 @@ def frames_and_features(
             sides[to] = 0.0 if fallback else min(opened[h1 // 3], opened[h2 // 3])
         p, q = row(points, a), row(points, b)
         extent[to] = _extent(lengths[e], p, q, row(points, c), row(points, d))
-        features[to, 0] = x
-        features[to, LOGS] = logs[ac] - logs[e]
-        features[to, LOGS + 1] = logs[bc] - logs[e]
-        features[to, LOGS + 2] = logs[ad] - logs[e]
-        features[to, LOGS + 3] = logs[bd] - logs[e]
-        if width > DIHEDRAL:
-            at_a, at_b, at_c, at_d = (
-                four(fields, a),
-                four(fields, b),
-                four(fields, c),
-                four(fields, d),
-            )
-            _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d)
+        at = logs[ac], logs[bc], logs[ad], logs[bd]
+        _write_two_faces(features, to, starts, x, at, logs[e], dot(cross(n, m), t))
+        if len(fields):
+            at_a, at_b = four(fields, a), four(fields, b)
+            at_c, at_d = four(fields, c), four(fields, d)
+            _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d)
 
 
 @inlined
@@ -143,16 +137,35 @@ def four(values, i):
 
 
 @inlined
-def _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d):
-    """Write the features with a sign; ``at_a`` … ``at_d`` are mean normals and umbrella heights."""
-    features[to, DIHEDRAL] = dot(cross(n, m), t)
-    features[to, ENDS], features[to, ENDS + 1] = dot(at_a, t), dot(at_b, t)
-    features[to, ENDS + 2], features[to, ENDS + 3] = dot(at_a, side), dot(at_b, side)
-    features[to, WINGS], features[to, WINGS + 1] = dot(at_c, t), dot(at_d, t)
-    features[to, WINGS + 2], features[to, WINGS + 3] = dot(at_c, side), dot(at_d, side)
-    if width > UMBRELLAS:
-        features[to, UMBRELLAS], features[to, UMBRELLAS + 1] = at_a[HEIGHT], at_b[HEIGHT]
-        features[to, UMBRELLAS + 2], features[to, UMBRELLAS + 3] = at_c[HEIGHT], at_d[HEIGHT]
+def _write_two_faces(features, to, starts, x, logs, log, dihedral):
+    """Write the groups that see both faces alone; ``logs`` and ``log`` are of ac … bd and of h."""
+    k = starts[CURVATURE]
+    if k >= 0:
+        features[to, k] = x
+    k = starts[SHAPE]
+    if k >= 0:
+        features[to, k], features[to, k + 1] = logs[0] - log, logs[1] - log
+        features[to, k + 2], features[to, k + 3] = logs[2] - log, logs[3] - log
+    k = starts[DIHEDRAL]
+    if k >= 0:
+        features[to, k] = dihedral
+
+
+@inlined
+def _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d):
+    """Write the groups that see rings: ``at_a`` … ``at_d``, mean normals and umbrella heights."""
+    k = starts[ENDS]
+    if k >= 0:
+        features[to, k], features[to, k + 1] = dot(at_a, t), dot(at_b, t)
+        features[to, k + 2], features[to, k + 3] = dot(at_a, side), dot(at_b, side)
+    k = starts[WINGS]
+    if k >= 0:
+        features[to, k], features[to, k + 1] = dot(at_c, t), dot(at_d, t)
+        features[to, k + 2], features[to, k + 3] = dot(at_c, side), dot(at_d, side)
+    k = starts[UMBRELLA]
+    if k >= 0:
+        features[to, k], features[to, k + 1] = at_a[HEIGHT], at_b[HEIGHT]
+        features[to, k + 2], features[to, k + 3] = at_c[HEIGHT], at_d[HEIGHT]
 
 
 @inlined
@@ -177,10 +190,10 @@ def wing(values, h, corners, offsets, face_of_corner):
 
 
 @inlined
-def _log_ratio(p, q, log):
-    """Return the logarithm of a distance, less ``log``."""
+def _log(p, q):
+    """Return the logarithm of a distance."""
     spoke = difference(p, q)
-    return math.log(max(root(dot(spoke, spoke)), SHORTEST)) - log
+    return math.log(max(root(dot(spoke, spoke)), SHORTEST))
 
 
 @kernel
@@ -199,6 +212,7 @@ def polygon_frames_and_features(
     rows,
     begin,
     end,
+    starts,
     frames,
     curvature,
     sides,
@@ -212,7 +226,6 @@ def polygon_frames_and_features(
     In place of the opposite vertices c and d stand the means of the faces' other corners, where
     fields are means too.
     """
-    width = features.shape[1]
     for i in range(begin, end):
         e, to = rows[i], i - begin
         a, b = edges[e, 0], edges[e, 1]
@@ -233,16 +246,13 @@ def polygon_frames_and_features(
         d = wing(points, h2, corners, offsets, face_of_corner)
         p, q = row(points, a), row(points, b)
         extent[to] = _extent(lengths[e], p, q, c[:3], d[:3])
-        features[to, 0] = x
-        features[to, LOGS] = _log_ratio(c, p, logs[e])
-        features[to, LOGS + 1] = _log_ratio(c, q, logs[e])
-        features[to, LOGS + 2] = _log_ratio(d, p, logs[e])
-        features[to, LOGS + 3] = _log_ratio(d, q, logs[e])
-        if width > DIHEDRAL:
+        at = _log(c, p), _log(c, q), _log(d, p), _log(d, q)
+        _write_two_faces(features, to, starts, x, at, logs[e], dot(cross(n, m), t))
+        if len(fields):
             at_c = wing(fields, h1, corners, offsets, face_of_corner)
             at_d = wing(fields, h2, corners, offsets, face_of_corner)
             at_a, at_b = four(fields, a), four(fields, b)
-            _write_signed(features, to, width, n, m, t, side, at_a, at_b, at_c, at_d)
+            _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d)
 
 
 # --- face vertices --------------------------------------------------------------------------------

@@ -14,15 +14,18 @@ from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
+
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
 PAPER_FORMAT, DEFAULT_FORMAT = 1, 4
 RETIRED_FORMATS = (2, 3)
 
 # How many columns each feature set has.
-FACE_FEATURES: Mapping[str, int] = MappingProxyType({"face-8": 8})
-EDGE_FEATURES: Mapping[str, int] = MappingProxyType({"paper-5": 5, "signed-18": 18})
-VERTEX_FEATURES: Mapping[str, int] = MappingProxyType({"ring-10": 10})
+EDGE_FEATURES, VERTEX_FEATURES, FACE_FEATURES = (
+    MappingProxyType({name: seen.count for name, seen in sets.items()})
+    for sets in (FEATURE_SETS, RING_FEATURE_SETS, FACE_FEATURE_SETS)
+)
 SHARPNESS_FEATURES: Mapping[str, int] = MappingProxyType({"crease-53": 53})
 ORIENTATIONS = ("first-face", "symmetric")
 BASES = ("loop", "catmull-clark")

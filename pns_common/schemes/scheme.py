@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -14,7 +15,7 @@ from jaxtyping import Float, Integer
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases, chosen_creases
 from pns_common.errors import MeshError, ModelError, ParameterError
-from pns_common.features import FEATURE_COUNT
+from pns_common.features import FEATURE_SETS
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
 from pns_common.model.card import PAPER_FORMAT
@@ -23,11 +24,12 @@ from pns_common.model.session import Model, PolygonModel
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
+from pns_common.scheme_names import BASE_SCHEMES
 from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
 
-BASES = {base.name: base for base in (LOOP, CATMULL_CLARK)}
-NAMES = (LOOP.name, CATMULL_CLARK.name, "pns")
+BASES: dict[str, BaseScheme] = {name: resolve_name(place) for name, place in BASE_SCHEMES.items()}
+NAMES = (*BASES, "pns")
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,10 @@ class Scheme:
             if self.for_polygons is None:
                 raise MeshError("polygons, expected triangles", element="faces")
             return self.for_polygons().matrix(mesh, levels, creases)
-        sparse = import_module("scipy.sparse")
+        try:
+            sparse = import_module("scipy.sparse")
+        except ImportError as error:
+            raise ImportError("a scheme's matrix needs scipy: pip install scipy") from error
         kept = chosen_creases(creases, self.creases)
         topologies = [kept.applied(mesh.vertices, mesh.topology())]
         for depth in range(1, levels):
@@ -142,7 +147,7 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     named = {"budget": budget, "model": model.name, "model_hash": model.hash}
     rule = Rule(
         partial(_edges_at_unit_budget, model),
-        FEATURE_COUNT[card.features],
+        FEATURE_SETS[card.features],
         card.orientation == "symmetric",
         card.gate_sharpness,
         budget,

@@ -223,7 +223,7 @@ def info(
     from ..model_info import print_model, print_models
 
     if model is None:
-        print_models(load_model(name) for name in bundled_models())
+        print_models(load_model(name) for name in bundled_models(companions=True))
     else:
         print_model(load_model(model))
 

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import Any
 
 from pns_common.model.session import Model
-from pns_common.schemes import Scheme, catmull_clark, loop, pns
+from pns_common.schemes import Scheme, catmull_clark, named_scheme, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course
@@ -155,10 +155,8 @@ def make_scheme(options: Options, model: Model | None) -> Scheme:
     Raises:
         NoModelError: a model is asked for, and there is none.
     """
-    if options.scheme == "loop":
-        return loop()
-    if options.scheme == "catmull-clark":
-        return catmull_clark()
+    if not options.learns:
+        return named_scheme(options.scheme)
     if model is None:
         raise NoModelError("no model is loaded; scheme=loop needs none")
     return pns(model, options.budget)
@@ -168,11 +166,12 @@ def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
     """Return the scheme for a file: a companion for polygons if that is what its triangles are.
 
     Raises:
-        InvalidParameter: Catmull–Clark is asked for some of the faces.
+        InvalidParameter: a scheme of polygons is asked for some of the faces.
     """
     if options.selects:
         if scheme.base.polygons:
-            raise InvalidParameter("scheme", "catmull-clark refines all faces of a glTF, or none")
+            message = f"{scheme.base.name} refines all faces of a glTF, or none"
+            raise InvalidParameter("scheme", message)
         return scheme
     if options.polygons == "auto" and scheme.for_polygons is not None and mostly_polygons(upload):
         return scheme.for_polygons()
@@ -181,9 +180,7 @@ def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
 
 def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
     """Return the scheme that refines polygons as such; None: they are cut into triangles."""
-    if options.scheme == "catmull-clark":
-        return catmull_clark()
-    if options.learns and model is not None:
+    if not options.learns or model is not None:
         made = make_scheme(options, model)
         if made.base.polygons or made.for_polygons is not None:
             return made if made.for_polygons is None else made.for_polygons()

@@ -243,6 +243,12 @@ def converted(
         options = replace(options, compress="none")
     with course.part(0.1, 0.8):
         refined, report = refine_mesh_file(mesh, scheme, options, limits, course, traced=traced)
+    if model is not None and options.learns and scheme.rule is None:
+        without = (
+            f"the model {model.name} has no rules for polygons, so this is {scheme.name} without "
+            "it: use scheme=pns to cut them into triangles for it"
+        )
+        report = {**report, "advice": [without, *report["advice"]]}
     with course.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
             glb, report = as_glb(refined, report, options, siblings, course)
@@ -273,7 +279,7 @@ def _map_of(mesh: MeshFile, target: str) -> Arrays:
 
 def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme]:
     """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
-    if options.scheme == "catmull-clark" or (mesh.sizes != 3).any():
+    if not options.learns or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
         if scheme is not None:
             return mesh, scheme
@@ -330,7 +336,7 @@ def _line(count: int, what: str) -> str:
 
 def as_flags(text: str) -> str:
     """Return advice with the options as the command line spells them."""
-    options = r"\b(compress|crease|normals|weld_tolerance)="
+    options = r"\b(compress|crease|normals|scheme|weld_tolerance)="
     return re.sub(options, lambda found: f"--{found[1].replace('_', '-')} ", text)
 
 

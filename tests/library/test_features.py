@@ -3,21 +3,25 @@
 import numpy as np
 import pytest
 
+from pns_common import Mesh
 from pns_common.features import (
-    FEATURE_COUNT,
+    EDGE_GROUPS,
     FEATURE_SETS,
     HALF_TURN,
     MIRROR,
     RING_10,
     RING_FEATURE_SETS,
+    SIGNED_18,
     TURN_OVER,
     Feature,
+    FeatureSet,
     symmetries,
 )
 from pns_common.level import Level
+from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
 from pns_common.operator import Rule, edge_inputs, vertex_inputs
 from pns_common.parallel import Blocks
-from pns_common.schemes import LOOP
+from pns_common.schemes import CATMULL_CLARK, LOOP
 from pns_common.topology import build_topology
 from tests.support.meshes import bumpy_sphere
 
@@ -30,7 +34,7 @@ def test_the_symmetries_are_a_group_of_involutions(name):
     elements = list(zip(group.order, group.signs, group.local, strict=True))
     known = {(tuple(o), tuple(s), tuple(d)) for o, s, d in elements}
     count = SETS[name].count
-    assert FEATURE_COUNT[name] == count == int(name.partition("-")[2])
+    assert {**EDGE_FEATURES, **VERTEX_FEATURES}[name] == count == int(name.partition("-")[2])
     np.testing.assert_array_equal(elements[0][0], np.arange(count))
     size = 2 if name == "ring-10" else 8 if any(f.turn_over < 0 for f in declared) else 4
     assert len(known) == size
@@ -62,7 +66,7 @@ def test_rotations_of_the_frame_keep_its_orientation_and_mirrors_turn_it():
 def edges_of(points, faces, name):
     """The stencil's features and frames at every edge of a closed mesh, by its ends."""
     level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
-    rule = Rule(lambda phi: phi[:, :3], FEATURE_COUNT[name], True, 1.0, 1.0)
+    rule = Rule(lambda phi: phi[:, :3], FEATURE_SETS[name], True, 1.0, 1.0)
     at = edge_inputs(level, rule, level.topology.interior)
     keys = level.topology.edges[at.rows].astype(int)
     return {
@@ -75,7 +79,10 @@ def edges_of(points, faces, name):
 TURNED_OVER, MIRRORED = 4, 2
 
 
-@pytest.mark.parametrize("name", ["signed-14", "signed-18"])
+SIGNED = [name for name, seen in FEATURE_SETS.items() if TURN_OVER in seen.generators]
+
+
+@pytest.mark.parametrize("name", SIGNED)
 def test_faces_turned_over_permute_and_sign_the_features(name):
     points, faces = bumpy_sphere()
     seen, turned = edges_of(points, faces, name), edges_of(points, faces[:, ::-1], name)
@@ -113,6 +120,35 @@ def test_other_numbers_of_the_ends_are_a_half_turn(name):
         np.testing.assert_allclose(frame, group.local[1][:, None] * basis, atol=1e-13)
 
 
+COMPOSED = [
+    (*EDGE_GROUPS[:2], EDGE_GROUPS[-1]),
+    (EDGE_GROUPS[3],),
+    (EDGE_GROUPS[2], EDGE_GROUPS[0]),
+    EDGE_GROUPS[::-1],
+]
+
+
+@pytest.mark.parametrize("groups", COMPOSED, ids=lambda groups: "-".join(g.name for g in groups))
+@pytest.mark.parametrize("polygons", [False, True])
+def test_a_set_of_any_groups_has_their_columns_and_no_others(groups, polygons):
+    """Also where a set is as wide as another one, or narrower than a group of it."""
+    points, faces = bumpy_sphere()
+    mesh = Mesh(points, [*faces[1:], [*faces[0]]])
+    faces = (mesh.corners, mesh.offsets) if polygons else mesh.faces
+    base = CATMULL_CLARK if polygons else LOOP
+    level = Level(points, build_topology(faces, len(points)), base, 1.0, Blocks())
+
+    def columns(seen):
+        rule = Rule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
+        return edge_inputs(level, rule, level.topology.interior).features
+
+    every = FeatureSet("every", EDGE_GROUPS, (HALF_TURN,))
+    whole, of_group = columns(every), dict(zip(EDGE_GROUPS, every.starts, strict=True))
+    places = [of_group[g] + k for g in groups for k in range(len(g.features))]
+    made = columns(FeatureSet("composed", tuple(groups), (HALF_TURN,)))
+    np.testing.assert_array_equal(made, whole[:, places])
+
+
 def test_features_keep_their_limits():
     points, faces = bumpy_sphere(bump=0.6)
     rows = np.array([phi for phi, _ in edges_of(points, faces, "signed-18").values()])
@@ -122,7 +158,7 @@ def test_features_keep_their_limits():
 
 def test_rings_turned_over_sign_the_features():
     points, faces = bumpy_sphere()
-    rule = Rule(lambda phi: phi[:, :3], 18, True, 1.0, 1.0)
+    rule = Rule(lambda phi: phi[:, :3], SIGNED_18, True, 1.0, 1.0)
     at = []
     for turned in (faces, faces[:, ::-1]):
         level = Level(points, build_topology(turned, len(points)), LOOP, 1.0, Blocks())

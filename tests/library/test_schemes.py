@@ -51,7 +51,7 @@ def test_each_number_of_a_card_reaches_its_place_in_the_rule():
     rule = scheme.rule
     named = {name: getattr(rule, name) for name in numbers if name != "boundary_strength"}
     assert named | {"boundary_strength": rule.curve_strength} == numbers
-    assert (rule.budget, rule.feature_count, rule.symmetric) == (4.0, 18, True)
+    assert (rule.budget, rule.seen.name, rule.symmetric) == (4.0, "signed-18", True)
     assert (scheme.learned_levels, scheme.creases.levels) == (1, 3)
 
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ModelError, loop, pns, refine, sharp_edges, sharpness
+from pns_common.features import SIGNED_18
 from pns_common.level import Level
 from pns_common.operator import Rule
 from pns_common.parallel import Blocks
@@ -40,7 +41,7 @@ def level_of(mesh, threads=1):
 
 def rule_with(network):
     return Rule(
-        *(lambda phi: phi[:, :3], 18, True, 1.0, 1.0),
+        *(lambda phi: phi[:, :3], SIGNED_18, True, 1.0, 1.0),
         vertex_gate_sharpness=C_V,
         sharpness_network=network,
     )

@@ -7,10 +7,12 @@ from functools import partial
 import msgspec
 import numpy as np
 import pytest
+import trimesh
 from onnx import helper
 from typer.testing import CliRunner
 
 import train.run
+from pns_common import loop, pns, refine
 from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
 from tests.support.networks import (
     CARD,
@@ -22,7 +24,7 @@ from tests.support.networks import (
 )
 from tests.support.schemes import BUDGET, SOUND
 from train.certificates.affine import affine_reproduction
-from train.certificates.bodies import flat_bodies, synthetic_bodies
+from train.certificates.bodies import flat_bodies, real_bodies, synthetic_bodies
 from train.certificates.certify import (
     Verdict,
     certify_model_file,
@@ -227,14 +229,69 @@ def test_the_command_passes_and_looks_at_given_meshes(tmp_path, monkeypatch):
     outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
     assert outcome.exit_code == 0, outcome.output
     assert "every certificate passed" in outcome.output
-    assert json.loads(verdict.read_text())["meshes"] == ["tetrahedron"]
+    (own,) = json.loads(verdict.read_text())["meshes"]
+    assert (own["name"], own["faces"], own["skipped"]) == ("tetrahedron.off", 4, None)
+    assert 0 < own["proximity"] <= 1
+
+
+CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+QUADS = CUBE + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+
+
+def test_own_meshes_are_named_with_theorem_4_or_why_they_were_skipped(tmp_path):
+    folder, path = tmp_path / "meshes", tmp_path / "verdict.json"
+    folder.mkdir()
+    (folder / "cube.obj").write_text(QUADS)
+    made = trimesh.creation.torus(1, 0.4, major_sections=9, minor_sections=6)
+    made.export(folder / "ring.ply")
+    arguments = ["certify", "paper", "--only", "T4", "--meshes", str(folder), "--json", str(path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 0, outcome.output
+    words = " ".join(outcome.output.split())
+    assert "skipped: has polygons" in words
+    assert "They took part in T4." in words
+    verdict = json.loads(path.read_text())
+    assert {row["theorem"] for row in verdict["certificates"]} == {"T4"}
+    cube, ring = verdict["meshes"]
+    assert (cube["name"], cube["faces"], cube["proximity"]) == ("cube.obj", 6, None)
+    # The same by arithmetic of its own, at the size that the mesh has.
+    (body,) = (body for body in real_bodies(folder) if body.name == "ring.ply")
+    mesh, scheme = body.mesh, pns(load_model("paper"))
+    ours = refine(mesh, scheme, 1, 1.0, creases=None).mesh.vertices
+    apart = np.linalg.norm(ours - loop().matrix(mesh) @ mesh.vertices, axis=1).max()
+    corners = mesh.vertices[mesh.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    assert ring["proximity"] == pytest.approx(apart / (scheme.budget * longest**2), rel=1e-6)
+
+
+def test_polygons_of_an_obj_stay_polygons(tmp_path):
+    (tmp_path / "cube.obj").write_text(QUADS)
+    (body,) = real_bodies(tmp_path)
+    assert [len(face) for face in body.mesh.polygons] == [4] * 6
+
+
+@pytest.mark.parametrize("text", ["v 0 0 0\n", "v 0 0\nf 1 1 1\n", "v 0 0 0\nf 1 2 9\n"])
+def test_a_file_that_is_no_mesh_is_named(tmp_path, text):
+    (tmp_path / "wrong.obj").write_text(text)
+    arguments = ["certify", "--meshes", str(tmp_path)]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 2
+    assert "wrong.obj: " in outcome.output
+
+
+def test_an_unknown_theorem_is_an_error_of_use():
+    arguments = ["certify", "paper", "--only", "T9"]
+    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+    assert outcome.exit_code == 2
+    assert "T8" in outcome.output
 
 
 def test_the_command_names_a_file_as_it_is_called():
     """Square brackets are markup to what prints."""
     outcome = CliRunner().invoke(train.run.app, ["certify", "a[/b].onnx"], catch_exceptions=False)
     assert outcome.exit_code == 1
-    assert "Certificates of a[/b].onnx" in outcome.output
+    assert outcome.output.strip().startswith("a[/b].onnx: no model: ")
+    assert "nan" not in outcome.output
 
 
 def test_a_verdict_into_a_folder_is_refused_before_the_work(tmp_path):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from pns_common.curves import find_curves
+from pns_common.features import FEATURE_SETS
 from pns_common.level import Level
 from pns_common.operator import Rule, edge_inputs, learned_level, vertex_inputs
 from pns_common.parallel import Blocks
@@ -17,14 +18,13 @@ from train.connectivity import Connectivity, connect
 from train.data.primitives import icosphere
 from train.loop_masks import Mask, limit_mask, loop_mask
 from train.reference import (
+    EDGE_FEATURES,
     GeneralRule,
     PaperRule,
     Surroundings,
     edge_frames,
-    paper_5,
     read_edges,
     ring_10,
-    signed_18,
 )
 
 SEEDS = range(12)
@@ -106,11 +106,11 @@ def test_loop_and_its_limit_agree(both):
         )
 
 
-@pytest.mark.parametrize("symmetric", [False, True])
-def test_frames_and_features_agree(both, symmetric):
+@pytest.mark.parametrize("name", EDGE_FEATURES)
+def test_frames_and_features_agree(both, name):
     _, level, points, mesh = both
-    columns, count = (signed_18, 18) if symmetric else (paper_5, 5)
-    rule = Rule(network(count, 0), count, symmetric, 10.0, 0.5)
+    columns, seen, symmetric = EDGE_FEATURES[name], FEATURE_SETS[name], name != "paper-5"
+    rule = Rule(network(seen.count, 0), seen, symmetric, 10.0, 0.5)
     ours = edge_inputs(level, rule, level.topology.interior)
     around = Surroundings(mesh, points)
     edges = read_edges(around, first_face=not symmetric)
@@ -125,26 +125,27 @@ def test_frames_and_features_agree(both, symmetric):
     np.testing.assert_allclose(ring_10(around)[level.ringed], at_rings.features, **CLOSE)
 
 
-@pytest.mark.parametrize("symmetric", [False, True])
-def test_a_step_of_the_paper_agrees(both, symmetric):
+@pytest.mark.parametrize("name", EDGE_FEATURES)
+def test_a_step_of_the_paper_agrees(both, name):
     seed, level, points, mesh = both
-    count, columns = (18, signed_18) if symmetric else (5, paper_5)
-    answer = network(count, seed)
-    made = learned_level(level, Rule(answer, count, symmetric, 10.0, 0.5))
+    columns, seen, symmetric = EDGE_FEATURES[name], FEATURE_SETS[name], name != "paper-5"
+    answer = network(seen.count, seed)
+    made = learned_level(level, Rule(answer, seen, symmetric, 10.0, 0.5))
     step = PaperRule(answer, 0.5, 10.0, columns, first_face=not symmetric)(points, mesh)
     np.testing.assert_allclose(step.points, made.points, **CLOSE)
     np.testing.assert_allclose(step.ratio, made.ratio, **CLOSE)
     np.testing.assert_allclose(step.gate, made.gate, **CLOSE)
 
 
+@pytest.mark.parametrize("name", EDGE_FEATURES)
 @pytest.mark.parametrize("budget", [0.3, 10.0])
-def test_a_step_of_the_default_agrees(both, budget):
+def test_a_step_of_the_default_agrees(both, budget, name):
     seed, level, points, mesh = both
-    edges, vertices = network(18, seed), network(10, seed + 1)
-    made = learned_level(
-        level, Rule(edges, 18, True, 1e3, budget, vertices, 1e2, 0.85, 0.7, 0.4, 20.0)
-    )
-    rule = GeneralRule(edges, vertices, budget, 1e3, 1e2, 0.85, 0.7, 0.4, 20.0)
+    seen, numbers = FEATURE_SETS[name], (0.85, 0.7, 0.4, 20.0)
+    edges, vertices = network(seen.count, seed), network(10, seed + 1)
+    rule = Rule(edges, seen, True, 1e3, budget, vertices, 1e2, *numbers)
+    made = learned_level(level, rule)
+    rule = GeneralRule(edges, vertices, budget, 1e3, 1e2, *numbers, EDGE_FEATURES[name])
     step = rule(points, mesh)
     np.testing.assert_allclose(step.points, made.points, **CLOSE)
     np.testing.assert_array_equal(step.scale, made.scale)

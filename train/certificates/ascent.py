@@ -21,7 +21,7 @@ from train.loop_masks import limit_mask
 from train.models.networks import unit_correction
 from train.models.recipe import ScaleFree
 from train.models.tied import TiedNet
-from train.reference import GeneralRule, Step, Surroundings
+from train.reference import EDGE_FEATURES, GeneralRule, Step, Surroundings
 
 RATE = 0.03
 GATE_SHARPNESS, VERTEX_GATE_SHARPNESS = 1e6, 1e3
@@ -58,10 +58,11 @@ def ascend(
     seed: int,
     steps: int,
     loudness: float = 1.0,
+    features: str = "signed-18",
 ) -> Worst:
     """Climb a goal from random weights, `loudness` times their usual size, and from a mesh."""
     generator = torch.Generator().manual_seed(seed)
-    edges = TiedNet(FEATURE_SETS["signed-18"].symmetries, (2, 2), "gelu", generator).double()
+    edges = TiedNet(FEATURE_SETS[features].symmetries, (2, 2), "gelu", generator).double()
     vertices = TiedNet(RING_10.symmetries, (4,), "gelu", generator).double()
     with torch.no_grad():
         for weight in (*edges.parameters(), *vertices.parameters()):
@@ -76,6 +77,7 @@ def ascend(
         form.boundary_strength,
         form.network_scale,
         form.fold_angle,
+        EDGE_FEATURES[features],
     )
     level = connect(np.array(mesh.faces), len(mesh.vertices))
     after = connect(level.split().numpy(), level.vertex_count + len(level.edges))

@@ -162,13 +162,15 @@ def flat_bodies(seed: int) -> tuple[Body, ...]:
 def real_bodies(folder: Path) -> tuple[Body, ...]:
     """Read the mesh files of a folder, cleaned, centred and scaled to the reference length 1.
 
+    Polygons of an OBJ stay; those of other files are cut into triangles.
+
     Raises:
-        MeshError: the folder has no mesh file.
+        MeshError: the folder has no mesh file, or one that holds no mesh; the error names it.
     """
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_ENDINGS)
     if not paths:
         raise MeshError(f"no {', '.join(MESH_ENDINGS)} file in {folder}", element="folder")
-    return tuple(Body(path.stem, _read(path)) for path in paths)
+    return tuple(Body(path.name, _read(path)) for path in paths)
 
 
 def random_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -178,14 +180,20 @@ def random_motion(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _read(path: Path) -> Mesh:
-    # Vertices at one place are one vertex: a seam would be a boundary.
-    loaded = trimesh.load_mesh(path, process=False)
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh = clean(Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))).mesh
+    try:
+        if path.suffix.lower() == ".obj":
+            mesh = Mesh.load(path)
+        else:
+            loaded = trimesh.load_mesh(path, process=False)
+            mesh = Mesh(np.asarray(loaded.vertices), np.asarray(loaded.faces))
+        # Vertices at one place are one vertex: a seam would be a boundary.
+        places, number = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
+        mesh = clean(Mesh(places, (number.reshape(-1)[mesh.corners], mesh.offsets))).mesh
+    except Exception as error:  # on a broken file trimesh fails as it comes
+        raise MeshError(f"{path}: {error}") from error
     centred = mesh.vertices - mesh.vertices.mean(axis=0)
-    return Mesh(
-        centred / measure_reference_length(mesh.vertices, mesh.faces.reshape(-1)), mesh.faces
-    )
+    scale = measure_reference_length(mesh.vertices, mesh.corners)
+    return Mesh(centred / scale, (mesh.corners, mesh.offsets))
 
 
 def _lay(plane: Float[np.ndarray, "V 2"]) -> Float[np.ndarray, "V 3"]:

@@ -10,12 +10,12 @@ import msgspec
 from rich.markup import escape
 from rich.table import Table
 
-from pns_common import ModelError, PnsError
+from pns_common import ModelError, ParameterError, PnsError
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bases import LOOP
 from train.certificates.bodies import Bodies, Body, polygon_bodies, triangle_bodies
-from train.certificates.displacement import bounded_displacement
+from train.certificates.displacement import AT_MOST, bounded_displacement
 from train.certificates.double_precision import double_model, read_bytes
 from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
@@ -30,10 +30,18 @@ from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
 from train.certificates.scaling import (
     lipschitz_slope,
     normal_variation_slope,
+    proximity,
+    proximity_ratio,
     proximity_slope,
     regular_smoothness,
 )
-from train.certificates.subject import Certificate, Subject, subject_of_model
+from train.certificates.subject import (
+    Certificate,
+    Kind,
+    Subject,
+    in_words,
+    subject_of_model,
+)
 from train.spectra.spectrum import VALENCES
 
 # Called with what comes next, how many steps are done, and of how many.
@@ -41,30 +49,70 @@ OnProgress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
+class OwnMesh:
+    """A mesh that was given.
+
+    Attributes:
+        proximity: its `proximity_ratio`, at most 1 by T4; NaN where it was skipped.
+        skipped: why it was, in words; empty where it was not.
+    """
+
+    name: str
+    faces: int
+    proximity: float
+    skipped: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """True where T4 holds on it."""
+        return self.proximity <= AT_MOST
+
+    @property
+    def failed(self) -> bool:
+        """True where it does not."""
+        return not (self.skipped or self.passed)
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """All certificates of one subject.
 
     Attributes:
-        facts: what was certified: the model's hash, the budget, the meshes.
+        facts: what was certified: the model's hash and the budget.
+        own: meshes that were given.
+        own_in: the theorems that they took part in.
     """
 
     name: str
     facts: dict[str, Any]
     certificates: tuple[Certificate, ...]
+    own: tuple[OwnMesh, ...] = ()
+    own_in: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
         """True where everything that counts has passed."""
-        return all(certificate.passed for certificate in self.certificates if certificate.counts)
+        certified = (each.passed for each in self.certificates if each.counts)
+        return all(certified) and not any(own.failed for own in self.own)
+
+    @property
+    def is_model(self) -> bool:
+        """False where the file is no model, of which nothing can be certified."""
+        return "sha256" in self.facts
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One piece of a certification: its theorem and title, should it fail to run, and the work."""
+    """One piece of a certification: its theorem and title, should it fail to run, and the work.
+
+    Attributes:
+        own: whether meshes that are given take part.
+    """
 
     theorem: str
     title: str
     work: Callable[[], Certificate | list[Certificate]]
+    own: bool = False
 
 
 def certify_model_file(
@@ -73,13 +121,18 @@ def certify_model_file(
     seed: int,
     on_progress: OnProgress,
     valences: Sequence[int] = VALENCES,
+    only: Sequence[str] = (),
 ) -> Verdict:
     """Certify a model file, also one that someone else made.
 
     Args:
         source: a file, a bundled name, or None for the default.
-        real: meshes beside the synthetic ones.
+        real: meshes beside the synthetic ones; polygons are skipped where the base is Loop.
         valences: of the stars.
+        only: theorems, as "T4"; empty for all.
+
+    Raises:
+        ParameterError: one of those is none.
     """
     source = DEFAULT_MODEL if source is None else source
     facts: dict[str, Any] = {"source": str(source)}
@@ -88,14 +141,32 @@ def certify_model_file(
         subject = subject_of_model(model, double_model(model, read_bytes(source)))
     except ModelError as error:
         return Verdict(str(source), facts, (refused("file", "the file keeps the contract", error),))
-    facts |= {
-        "sha256": model.hash,
-        "budget": subject.budget,
-        "meshes": [body.name for body in real],
-    }
-    word = Step("file", "the file keeps its word", lambda: keeps_its_word(model))
-    certificates = run_steps([word, *scheme_steps(subject, real, seed, valences)], on_progress)
-    return Verdict(model.name, facts, certificates)
+    facts |= {"sha256": model.hash, "budget": subject.budget}
+    kept = [body for body in real if body.mesh.triangles or subject.base is not LOOP]
+    bodies = [*(triangle_bodies if subject.base is LOOP else polygon_bodies)(seed).shaped, *kept]
+    made = [
+        Step("file", "the file keeps its word", lambda: keeps_its_word(model)),
+        Step("T4", "proximity", lambda: proximity(subject, bodies), own=True),
+        *scheme_steps(subject, kept, seed, valences),
+    ]
+    known = sorted({step.theorem for step in made})
+    for name in only:
+        if name not in known:
+            raise ParameterError("only", name, expected=f"one of {', '.join(known)}")
+    steps = sorted((s for s in made if not only or s.theorem in only), key=lambda s: s.theorem)
+    own = tuple(_own(subject, body, skipped=body not in kept) for body in real)
+    own_in = tuple(dict.fromkeys(step.theorem for step in steps if step.own))
+    return Verdict(model.name, facts, run_steps(steps, on_progress), own, own_in)
+
+
+def _own(subject: Subject, body: Body, *, skipped: bool) -> OwnMesh:
+    count = body.mesh.face_count
+    if skipped:
+        return OwnMesh(body.name, count, math.nan, "has polygons; this model refines triangles")
+    try:
+        return OwnMesh(body.name, count, proximity_ratio(subject, body.mesh))
+    except PnsError as error:
+        return OwnMesh(body.name, count, math.nan, str(error))
 
 
 def scheme_steps(
@@ -106,10 +177,15 @@ def scheme_steps(
     every = (*bodies.shaped, *real)
     shaped = bodies.shaped
     return [
-        Step("T1", "bounded displacement", lambda: bounded_displacement(subject, every, seed=seed)),
-        Step("T2", "equivariance", lambda: equivariance(subject, every, seed)),
+        Step(
+            "T1",
+            "bounded displacement",
+            lambda: bounded_displacement(subject, every, seed=seed),
+            own=True,
+        ),
+        Step("T2", "equivariance", lambda: equivariance(subject, every, seed), own=True),
         Step("T3", "affine reproduction", lambda: affine_reproduction(subject, bodies.flat, seed)),
-        Step("T4", "proximity slope", lambda: proximity_slope(subject, every)),
+        Step("T4", "proximity slope", lambda: proximity_slope(subject, every), own=True),
         Step("T5", "regular regions", lambda: regular_smoothness(subject, bodies.regular)),
         Step("T6", "normal-variation slope", lambda: normal_variation_slope(subject, shaped)),
         Step("T7", "Lipschitz slope", lambda: lipschitz_slope(subject, shaped, seed)),
@@ -129,11 +205,18 @@ def _steps_of_kind(
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
     rough = (*every, bodies.rough)
     return [
-        Step("folds", "fold-free", lambda: fold_free(subject, rough, seed)),
-        Step("turns", "turns of neighbours", lambda: neighbour_turns(subject, rough, seed)),
-        Step("limit", "limit distance", lambda: limit_distance(subject, rough, seed)),
+        Step("folds", "fold-free", lambda: fold_free(subject, rough, seed), own=True),
+        Step(
+            "turns", "turns of neighbours", lambda: neighbour_turns(subject, rough, seed), own=True
+        ),
+        Step("limit", "limit distance", lambda: limit_distance(subject, rough, seed), own=True),
         Step("class", "smoothness class", lambda: smoothness_class(subject, [bodies.coarse])),
-        Step("scale", "resolution independence", lambda: resolution_independence(subject, every)),
+        Step(
+            "scale",
+            "resolution independence",
+            lambda: resolution_independence(subject, every),
+            own=True,
+        ),
     ]
 
 
@@ -171,7 +254,16 @@ def verdict_json(verdict: Verdict) -> bytes:
         }
         for certificate in verdict.certificates
     ]
-    facts = {"name": verdict.name, **verdict.facts, "passed": verdict.passed}
+    meshes = [
+        {
+            "name": own.name,
+            "faces": own.faces,
+            "proximity": _number(own.proximity),
+            "skipped": own.skipped or None,
+        }
+        for own in verdict.own
+    ]
+    facts = {"name": verdict.name, **verdict.facts, "meshes": meshes, "passed": verdict.passed}
     return msgspec.json.format(msgspec.json.encode({**facts, "certificates": rows})) + b"\n"
 
 
@@ -188,11 +280,33 @@ def verdict_table(verdict: Verdict) -> Table:
     return table
 
 
+def own_table(verdict: Verdict) -> Table:
+    """Return T4 on each mesh that was given, one row a mesh."""
+    table = Table(
+        title="Your meshes: theorem 4, the largest |S_θ − S| over C h² / R",
+        caption=f"They took part in {', '.join(verdict.own_in)}." if verdict.own_in else None,
+        title_justify="left",
+        caption_justify="left",
+    )
+    table.add_column("Mesh", overflow="fold")
+    for heading in ("Faces", "Value", "Bound"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("")
+    for own in verdict.own:
+        word = "[green]pass[/]" if own.passed else "[red]fail[/]"
+        values = in_words(own.proximity), f"≤ {in_words(AT_MOST)}", word
+        if own.skipped:
+            values = "", "", f"skipped: {escape(own.skipped)}"
+        table.add_row(escape(own.name), f"{own.faces:,}", *values)
+    return table
+
+
 def _rows(verdict: Verdict) -> Iterator[tuple[str, ...]]:
     for certificate in verdict.certificates:
-        colour = "green" if certificate.passed else "red" if certificate.counts else "yellow"
-        word = "pass" if certificate.passed else "fail"
-        kind = "" if certificate.kind == "certificate" else f" ({certificate.kind})"
+        colour, word = ("green", "pass") if certificate.passed else ("red", "fail")
+        kind = " (measured)" if certificate.kind is Kind.MEASURED else ""
+        if certificate.kind is Kind.DIAGNOSTIC:
+            colour, word = "dim", "for comparison"
         name = (
             f"{certificate.name}\n[dim]{escape(certificate.where)}[/dim]"
             if certificate.where
@@ -201,8 +315,8 @@ def _rows(verdict: Verdict) -> Iterator[tuple[str, ...]]:
         yield (
             certificate.theorem,
             name,
-            f"{certificate.value:.6g}",
-            certificate.bound,
+            in_words(certificate.value),
+            certificate.bound if certificate.counts else "none",
             f"[{colour}]{word}[/]{kind}",
         )
 

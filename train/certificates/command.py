@@ -1,5 +1,6 @@
 """`python train/run.py certify [MODEL.onnx]`: pass or fail for each property, with its number."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,7 @@ from train.certificates.bodies import Body, real_bodies
 from train.certificates.certify import (
     Verdict,
     certify_model_file,
+    own_table,
     verdict_json,
     verdict_table,
 )
@@ -30,6 +32,9 @@ def certify_command(
             exists=True, file_okay=False, help="Folder of obj, off, ply and stl files to add."
         ),
     ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Theorem to certify, as T4; may be given again.")
+    ] = None,
     json: Annotated[
         Path | None, typer.Option(dir_okay=False, help="File to write the verdict to.")
     ] = None,
@@ -41,18 +46,26 @@ def certify_command(
         real = () if meshes is None else real_bodies(meshes)
         if json is not None:
             prepare_output(json)
+        verdict = _certify_with_progress(model, real, seed, only or [], console)
     except PnsError as error:
         console.print(escape(str(error)), style="red", soft_wrap=True)
         raise typer.Exit(2) from error
-    verdict = _certify_with_progress(model, real, seed, console)
-    console.print(verdict_table(verdict))
     if json is not None:
         replace_file(json, verdict_json(verdict))
+    if not verdict.is_model:
+        (broken,) = verdict.certificates
+        line = f"{verdict.name}: no model: {broken.name} failed: {broken.where}"
+        console.print(escape(line), style="red", soft_wrap=True)
+        raise typer.Exit(1)
+    console.print(verdict_table(verdict))
+    if verdict.own:
+        console.print(own_table(verdict))
     failed = [
         certificate.name
         for certificate in verdict.certificates
         if certificate.counts and not certificate.passed
     ]
+    failed += [f"theorem 4 on {own.name}" for own in verdict.own if own.failed]
     if failed:
         console.print(f"failed: {escape('; '.join(failed))}", style="red", soft_wrap=True)
         raise typer.Exit(1)
@@ -60,7 +73,7 @@ def certify_command(
 
 
 def _certify_with_progress(
-    model: str | None, real: tuple[Body, ...], seed: int, console: Console
+    model: str | None, real: tuple[Body, ...], seed: int, only: Sequence[str], console: Console
 ) -> Verdict:
     columns = (
         TextColumn("{task.description:<24}"),
@@ -73,5 +86,7 @@ def _certify_with_progress(
 
         def on_progress(title: str, done: int, total: int) -> None:
             progress.update(task, description=title, completed=done, total=total)
+            if not console.is_terminal:
+                console.print(f"{done} of {total}: {title}")
 
-        return certify_model_file(model, real, seed, on_progress)
+        return certify_model_file(model, real, seed, on_progress, only=only)

@@ -16,6 +16,9 @@ from train.refining import AnyScheme
 # A budget that no correction reaches.
 UNBOUNDED = 1e15
 
+# From 1, in `in_words`.
+NEAR = 1e-5
+
 
 @dataclass(frozen=True, eq=False)
 class Subject:
@@ -132,7 +135,7 @@ class Certificate:
         if self.low == self.high:
             return f"= {self.high:g}"
         if math.isinf(self.low):
-            return "any" if math.isinf(self.high) else f"≤ {_short(self.high)}"
+            return "any" if math.isinf(self.high) else f"≤ {in_words(self.high)}"
         if math.isinf(self.high):
             return f"≥ {self.low:g}"
         return f"{self.low:g} … {self.high:g}"
@@ -150,6 +153,8 @@ def farthest(measured: list[tuple[float, str]], expected: float) -> tuple[float,
     )
 
 
-def _short(value: float) -> str:
-    # A bound of 1 + rounding is shown as what it means.
-    return "1" if 0 < value - 1 < 1e-9 else f"{value:g}"
+def in_words(value: float) -> str:
+    """Return a number in six digits; beside 1 with its distance, which they would round away."""
+    if 0 < abs(value - 1) < NEAR:
+        return f"1 {'+' if value > 1 else '−'} {abs(value - 1):.2g}"
+    return f"{value:.6g}"

@@ -93,7 +93,8 @@ def run_all(
         total = sum(experiment.seconds for experiment in experiments)
         at_once = min(processes, len(experiments))
         minutes = max(1, round(total / at_once / 60))
-        progress.print(f"{len(experiments)} experiments, up to about {minutes} min")
+        plural = "s" if len(experiments) > 1 else ""
+        progress.print(f"{len(experiments)} experiment{plural}, up to about {minutes} min")
         overall = progress.add_task("all", total=total)
         steps: dict[str, TaskID] = {}
 
@@ -124,7 +125,8 @@ def _chosen(name: str | None, published: Path | None, assets: Path | None) -> li
     if name is None:
         return [experiment for experiment in EXPERIMENTS.values() if lacks(experiment) is None]
     if name not in EXPERIMENTS:
-        raise typer.BadParameter(f"no experiment {name!r}; there are {', '.join(EXPERIMENTS)}")
+        known = f"there are {', '.join(EXPERIMENTS)}; the theorems T1 to T8 are in structural"
+        raise typer.BadParameter(f"no experiment {name!r}; {known}")
     missing = lacks(EXPERIMENTS[name])
     if missing is not None:
         raise typer.BadParameter(f"{name} needs {missing}")

@@ -20,6 +20,7 @@ from torch import Tensor
 from pns_common import Mesh, Scheme, operator
 from pns_common.base_scheme import BaseScheme
 from pns_common.curves import Curves, find_curves
+from pns_common.features import FEATURE_SETS
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR
 from pns_common.level import Level
@@ -190,7 +191,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
     form, vertex_rule = scale_free_parts(recipe)
     rule = operator.Rule(
         edge_network=_not_asked,
-        feature_count=18,
+        seen=FEATURE_SETS[recipe.features],
         symmetric=True,
         gate_sharpness=recipe.gate_sharpness,
         budget=recipe.budget,

@@ -170,4 +170,5 @@ def general_rule(recipe: Recipe, network: BoundedNet, vertex_network: BoundedNet
         form.boundary_strength,
         form.network_scale,
         form.fold_angle,
+        EDGE_FEATURES[recipe.features],
     )

@@ -10,14 +10,25 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pns_common.features import FEATURE_COUNT, Symmetries
-from pns_common.model.card import SHARPNESS_FEATURES
+from pns_common.features import Symmetries
+from pns_common.model.card import (
+    EDGE_FEATURES,
+    FACE_FEATURES,
+    SHARPNESS_FEATURES,
+    VERTEX_FEATURES,
+)
 
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
 
 INPUT_COUNT: Mapping[str, int] = MappingProxyType(
-    {**FEATURE_COUNT, **SHARPNESS_FEATURES, RAW_COORDINATES: 12}
+    {
+        **EDGE_FEATURES,
+        **VERTEX_FEATURES,
+        **FACE_FEATURES,
+        **SHARPNESS_FEATURES,
+        RAW_COORDINATES: 12,
+    }
 )
 
 

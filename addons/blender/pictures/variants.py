@@ -12,12 +12,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
+from pns_common.features import SIGNED_18
 from pns_common.operator import Rule, pushes
 from pns_common.refinement import control_level
 from pns_common.topology import build_topology
 
 # N1 asks no network: pushes of strength 1 alone.
-N1 = Rule(lambda features: np.zeros((len(features), 3)), 18, True, 1.0, 1.0, prior_strength=1.0)
+N1 = Rule(
+    lambda features: np.zeros((len(features), 3)), SIGNED_18, True, 1.0, 1.0, prior_strength=1.0
+)
 # Triangles of one polygon turn by less; and quads that are joined of two bend and lean by less.
 FLAT, LEAN = radians(0.1), radians(40)
 

@@ -107,7 +107,7 @@ def test_help_has_everyday_options_first(pns: Any) -> None:
 
 def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
     listed = pns("info").out.splitlines()
-    assert set(bundled_models()) <= {line.partition(" ")[0] for line in listed}
+    assert set(bundled_models(companions=True)) <= {line.partition(" ")[0] for line in listed}
     assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
     shown = pns("info", "paper").out
     model = load_model("paper")

@@ -132,6 +132,19 @@ def test_each_scheme_takes_polygons_as_it_says() -> None:
         made(glb, "glb", "glb", scheme="catmull-clark", material="m0")
 
 
+@pytest.mark.parametrize("target", ["obj", "glb"])
+def test_a_model_that_polygons_leave_out_is_named(target: str) -> None:
+    def advice(scheme: Any, model: str) -> str:
+        options = Options(levels=1, scheme=scheme)
+        made = converted(cube(), "obj", target, options, load_model(model), Limits())
+        return "\n".join(made.report["advice"])
+
+    assert "model paper has no rules for polygons" in advice("auto", "paper")
+    assert "scheme=pns" in advice("auto", "paper")
+    for scheme, model in (("pns", "paper"), ("auto", "general"), ("catmull-clark", "paper")):
+        assert "no rules for polygons" not in advice(scheme, model)
+
+
 @pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "glb"])
 @pytest.mark.parametrize("levels", [1, 2])
 @pytest.mark.parametrize("name", ["m1", "top"])
