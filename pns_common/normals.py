@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
@@ -67,7 +67,8 @@ def angle_weighted_normals(
     """Return the unit normal of each group of corners; 0 without area, or where all cancel out.
 
     The faces' own normals are weighted by their angles at the corner (Thürmer and Wüthrich 1998):
-    however a flat side is cut into triangles, it weighs the same.
+    however a flat side is cut into triangles, it weighs the same. Triangles that are turned over
+    against their face as a whole do not count.
 
     Args:
         points: positions.
@@ -90,18 +91,19 @@ def angle_weighted_normals(
     return total
 
 
-def count_opposed(
+def opposed_corners(
     points: Float[np.ndarray, "N 3"],
     normals: Float[np.ndarray, "N 3"],
     faces: Integer[np.ndarray, "F 3"],
     blocks: Blocks,
-) -> int:
-    """Count the corners whose normal is more than 90 degrees off their triangle's own."""
-    counts = blocks.run(
+) -> Bool[np.ndarray, "F 3"]:
+    """Return the corners whose normal is more than 90 degrees off their triangle's own."""
+    opposed = np.empty((len(faces), 3), dtype=np.bool_)
+    blocks.run(
         len(faces),
-        lambda begin, end: kernels.count_opposed(points, normals, faces, begin, end),
+        lambda begin, end: kernels.mark_opposed(points, normals, faces, begin, end, opposed),
     )
-    return int(sum(counts))
+    return opposed
 
 
 def smooth_fans(

@@ -1,130 +1,67 @@
-"""The laboratory's entry: `python train/run.py` trains the default recipe.
-
-It writes a checkpoint and prints the held-out table.
-"""
+"""The laboratory's entry: `python train/run.py` trains the default recipe."""
 
 import sys
-import time
-from collections.abc import Generator
-from contextlib import contextmanager
-from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from pkgutil import resolve_name
 
 # Started as a file, Python looks for packages beside it and not in the checkout.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from pns_common import PnsError, pns
-from train.certificates.command import certify_command
-from train.experiments.beyond.validation import validate_command
-from train.experiments.command import reproduce_command
-from train.fitting.determinism import machine_fingerprint
-from train.fitting.trainer import Fit, fit
-from train.metrics.card import card_metrics
-from train.metrics.one_step import improvement_table, improvements_as_data
-from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.recipe import Recipe, of_length
-from train.models.recipes import RECIPES
-from train.models.torch_model import recipe_model
-from train.output_file import prepare_output
-
-CHECKPOINTS = Path("checkpoints")
-
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        dir_okay=False,
-        help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given.",
+# Where each stands, and what it does. To import one takes seconds: only that which is run is.
+COMMANDS = {
+    "train": (
+        "train.fitting.command:train_command",
+        "Train a recipe, write its checkpoint and print the held-out table.",
     ),
-]
+    "reproduce": (
+        "train.experiments.command:reproduce_command",
+        "Make the paper's tables and figures again, and those that it leaves open.",
+    ),
+    "certify": (
+        "train.certificates.command:certify_command",
+        "Certify a model file, also one that someone else made; exit 1 if a certificate fails.",
+    ),
+    "validate": (
+        "train.experiments.beyond.validation:validate_command",
+        "Print the validation table of a model.",
+    ),
+}
 
-if TYPE_CHECKING:
-    RecipeName = str
-else:  # A type checker cannot see the members that a table gives.
-    RecipeName = StrEnum("RecipeName", {name: name for name in RECIPES})
-DEFAULT_RECIPE = RecipeName("paper")
-
-app = typer.Typer(
-    help="Train, measure and certify the operator.",
-    # It would be for a command named run.py, which is not how this is started.
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-app.command("reproduce")(reproduce_command)
-app.command("certify")(certify_command)
-app.command("validate")(validate_command)
+# Completion would be for a command named run.py, which is not how this is started.
+made = partial(typer.Typer, add_completion=False, pretty_exceptions_enable=False)
+app = made(help="Train, measure and certify the operator.")
 
 
 @app.callback(invoke_without_command=True)
 def main(context: typer.Context) -> None:
     """Train the default recipe where no command is named."""
     if context.invoked_subcommand is None:
-        train()
+        run("train", context)
 
 
-@app.command()
-def train(
-    recipe: Annotated[RecipeName, typer.Option(help="What to train.")] = DEFAULT_RECIPE,
-    seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
-    steps: Annotated[int | None, typer.Option(min=1, help="In place of the recipe's.")] = None,
-    output: Output = None,
-) -> None:
-    """Train a recipe, write its checkpoint and print the held-out table."""
-    console = Console()
-    chosen = RECIPES[recipe](seed)
-    chosen = chosen if steps is None else of_length(chosen, steps)
-    path = output or CHECKPOINTS / f"{chosen.name}.safetensors"
-    with _errors_told(console):
-        prepare_output(path)
-    began = time.perf_counter()
-    with _progress(console) as progress:
-        task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
-        trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
-    _measure_and_save(path, chosen, trained, console)
-    _say_written(path, began, console)
+def run(name: str, context: typer.Context) -> None:
+    """Import a command and run it with the arguments that are left."""
+    alone = made()
+    place, _ = COMMANDS[name]
+    alone.command()(resolve_name(place))
+    alone(context.args, prog_name=context.command_path)
 
 
-@contextmanager
-def _errors_told(console: Console) -> Generator[None, None, None]:
-    """End the command in a line that says what was wrong."""
-    try:
-        yield
-    except PnsError as error:
-        console.print(escape(str(error)), style="red", soft_wrap=True)
-        raise typer.Exit(1) from error
+def forwarded(context: typer.Context) -> None:
+    """Run the command by whose name it was called."""
+    run(context.info_name or "", context)
 
 
-def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
-    network = trained.network
-    others = trained.vertex_network, trained.sharpness_network, trained.face_network
-    scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
-    improvements = card_metrics(recipe, scheme)
-    metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
-    machine = machine_fingerprint()
-    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, *others))
-    for name, rows in improvements.items():
-        console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
-
-
-def _say_written(path: Path, began: float, console: Console) -> None:
-    seconds = time.perf_counter() - began
-    console.print(f"{escape(str(path))} written in {seconds:.1f} s", soft_wrap=True)
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("loss {task.fields[loss]:.6f}"),
-        TimeRemainingColumn(),
-        console=console,
-    )
+for name, (_, about) in COMMANDS.items():
+    app.command(
+        name,
+        help=about,
+        add_help_option=False,
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    )(forwarded)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ index counts from the end.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +41,10 @@ def forget_stale_code() -> None:
     here = Path(__file__).parent
     newest = max(path.stat().st_mtime for path in here.glob("*.py"))
     for path in (here / "__pycache__").glob("*.nb[ic]"):
-        if path.stat().st_mtime < newest:
-            path.unlink(missing_ok=True)
+        # Other processes that start meanwhile delete it too.
+        with suppress(FileNotFoundError):
+            if path.stat().st_mtime < newest:
+                path.unlink()
 
 
 forget_stale_code()

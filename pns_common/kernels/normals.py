@@ -53,21 +53,22 @@ def angle_between(sine, cosine):
 
 
 @kernel
-def count_opposed(points, normals, faces, begin, end):
-    """Return how many corners of faces begin … end − 1 have a normal more than 90 degrees off."""
-    count = 0
+def mark_opposed(points, normals, faces, begin, end, opposed):
+    """Mark the corners of faces begin … end − 1 whose normal is more than 90 degrees off."""
     for f in range(begin, end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         area = cross(between(points, a, b), between(points, a, c))
         least = -ROUNDED * norm(area)
         for corner in range(3):
-            count += dot(row(normals, faces[f, corner]), area) < least
-    return count
+            opposed[f, corner] = dot(row(normals, faces[f, corner]), area) < least
 
 
 @kernel
 def measure_triangles(points, faces, triangles, begin, end, normals, angles):
-    """Write unit normals (0 without area) and angles of the triangles of faces begin … end − 1.
+    """Write unit normals and angles of the triangles of faces begin … end − 1.
+
+    Normals are 0 without area, and where a triangle is turned over against its face as a whole: a
+    fold, however small, has angles as wide as any.
 
     Args:
         faces: (F, T) points of each face.
@@ -77,6 +78,7 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
     """
     count = triangles.shape[0]
     for f in range(begin, end):
+        whole = 0.0, 0.0, 0.0
         for d in range(count):
             a, b, c = (
                 faces[f, triangles[d, 0]],
@@ -86,12 +88,17 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
             ab, bc, ca = between(points, a, b), between(points, b, c), between(points, c, a)
             vector = cross(ca, ab)
             twice_area = norm(vector)
+            whole = whole[0] + vector[0], whole[1] + vector[1], whole[2] + vector[2]
             normal = over(vector, twice_area if twice_area > 0 else 1.0)
             i = f * count + d
             for k in range(3):
                 normals[i, k] = normal[k]
             angles[i, 0] = angle_between(twice_area, -dot(ab, ca))
             angles[i, 1] = angle_between(twice_area, -dot(bc, ab))
+        for i in range(f * count, (f + 1) * count):
+            if dot(row(normals, i), whole) < 0:
+                for k in range(3):
+                    normals[i, k] = 0.0
 
 
 @kernel

@@ -11,6 +11,8 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
+from pns_common.scheme_names import BASE_SCHEMES
+
 from ..bodies import media
 from ..errors import NoModelError
 from ..settings import Settings
@@ -49,6 +51,7 @@ class LimitsEntry(BaseModel):
     result_seconds: float = Field(description="how long the result of a job is kept")
     result_bytes: int = Field(description="what all results may take, and so each")
     formats: list[str] = Field(description="media types of bodies")
+    schemes: list[str] = Field(description="base schemes that `scheme=` takes beside auto and pns")
 
 
 def limits_of(settings: Settings, client: Client) -> LimitsEntry:
@@ -64,6 +67,7 @@ def limits_of(settings: Settings, client: Client) -> LimitsEntry:
         result_seconds=settings.result_seconds,
         result_bytes=int(settings.result_bytes),
         formats=list(media.ACCEPTED),
+        schemes=list(BASE_SCHEMES),
     )
 
 

@@ -246,8 +246,15 @@ def _statements(
 
 
 def write_obj(mesh: MeshFile) -> bytes:
-    """Write the file's bytes; what faces are called stands before them."""
+    """Write the file's bytes; what faces are called stands before them.
+
+    The first object stands before the vertices.
+    """
     pieces = [f"mtllib {name}\n" for name in mesh.libraries]
+    objects = mesh.labels.get(OBJECT)
+    first = NONE if objects is None or not len(mesh.sizes) else int(objects.of_face[0])
+    if objects is not None and first >= 0:
+        pieces.append(f"o {objects.names[first]}\n")
     colours = mesh.layers.get(COLOUR)
     rows = mesh.vertices
     if colours is not None:
@@ -260,18 +267,20 @@ def write_obj(mesh: MeshFile) -> bytes:
         pieces += rows_text(f"vt {NUMBER} {NUMBER}\n", uv.values)
     if normals is not None:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
-    pieces += _faces_text(mesh, uv, normals)
+    pieces += _faces_text(mesh, uv, normals, first)
     return "".join(pieces).encode()
 
 
-def _faces_text(mesh: MeshFile, uv: Layer | None, normals: Layer | None) -> Iterator[str]:
+def _faces_text(
+    mesh: MeshFile, uv: Layer | None, normals: Layer | None, said_object: int
+) -> Iterator[str]:
     sizes = mesh.sizes
     has_uv, has_normal = (_of_faces(mesh, layer) for layer in (uv, normals))
     labels = {kind: label.of_face for kind, label in mesh.labels.items()}
     state = np.stack([has_uv, has_normal, *labels.values()], axis=1).astype(np.int64)
     turns = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
     bounds = [0, *turns.tolist(), len(sizes)]
-    said = dict.fromkeys(labels, NONE)
+    said = dict.fromkeys(labels, NONE) | {OBJECT: said_object}
     for begin, end in pairwise(bounds):
         for kind, of_face in labels.items():
             number = int(of_face[begin])

@@ -1,9 +1,11 @@
-"""Announce and count what is compiled."""
+"""Announce and count what is compiled, and forget what is stale."""
+
+import os
 
 import numpy as np
 import pytest
 
-from pns_common import progress
+from pns_common import kernels, progress
 from pns_common.kernels import inlined
 from pns_common.progress import compiling
 
@@ -45,3 +47,18 @@ def test_a_long_compilation_gives_signs_of_life(twice, monkeypatch):
         twice(np.ones(3))
     assert compiled.kernels == 2
     assert said[1:] == ["kernels compiled so far: 1", "kernels compiled so far: 2"]
+
+
+def test_code_older_than_a_source_is_forgotten_by_all_processes_that_start_at_once(
+    tmp_path, monkeypatch
+):
+    source, kept = tmp_path / "loops.py", tmp_path / "__pycache__"
+    kept.mkdir()
+    for path in (source, kept / "old.nbc", kept / "new.nbi"):
+        path.touch()
+    os.utime(kept / "old.nbc", (1, 1))
+    # To a process that listed it, a file that another has deleted since looks so.
+    (kept / "gone.nbc").symlink_to(tmp_path / "nothing")
+    monkeypatch.setattr(kernels, "__file__", str(source))
+    kernels.forget_stale_code()
+    assert {path.name for path in kept.iterdir()} == {"new.nbi", "gone.nbc"}

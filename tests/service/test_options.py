@@ -2,11 +2,9 @@
 
 import inspect
 import math
-import re
 import subprocess
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import get_args, get_type_hints
 
 import pytest
@@ -15,6 +13,7 @@ from service.cli.commands import subdivide
 from service.errors import InvalidParameter
 from service.http.parameters import Parameters
 from service.options import Options
+from tests.support.added_scheme import TRIANGLE, halved, with_linear
 
 WRONG = [
     ("levels", 0),
@@ -103,31 +102,16 @@ def test_the_command_line_and_http_offer_the_same_choices():
         assert get_args(get_args(annotation)[0]) == expected
 
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python.md"
-ROOT = PAGE.parents[2]
-RUN = """
-from pns_common.scheme_names import BASE_SCHEMES
-BASE_SCHEMES["linear"] = "linear:LINEAR"
-from service.cli import main
-main()
-"""
-
-
 def test_a_file_and_a_line_make_a_base_scheme_known_to_the_command_line(tmp_path):
-    """The file of the documentation, and the line that it names, here without a file changed."""
-    (code,) = re.findall(r"```python\n([^`]*BaseScheme\([^`]*)```", PAGE.read_text())
-    (tmp_path / "linear.py").write_text(code)
-    (tmp_path / "in.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n")
+    (tmp_path / "in.obj").write_text(TRIANGLE)
     arguments = ["subdivide", "in.obj", "-o", "out.obj", "--scheme", "linear", "--levels", "1"]
     done = subprocess.run(
-        [sys.executable, "-c", RUN, *arguments],
+        [sys.executable, "-c", "from service.cli import main; main()", *arguments],
         capture_output=True,
         text=True,
         check=False,
         cwd=tmp_path,
-        env={"PYTHONPATH": f"{tmp_path}:{ROOT}", "PATH": ""},
+        env=with_linear(tmp_path) | {"PATH": ""},
     )
     assert done.returncode == 0, done.stderr
-    lines = (tmp_path / "out.obj").read_text().splitlines()
-    points = {tuple(map(float, line.split()[1:4])) for line in lines if line.startswith("v ")}
-    assert points == {(0, 0, 0), (4, 0, 0), (0, 4, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)}
+    assert halved((tmp_path / "out.obj").read_text())

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import train.fitting.command
 import train.run
 from train.models.checkpoint import load_checkpoint
 from train.models.recipe import of_length
@@ -20,7 +21,7 @@ def quick_paper(seed=0):
 
 def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(train.run, "RECIPES", {"paper": quick_paper})
+    monkeypatch.setattr(train.fitting.command, "RECIPES", {"paper": quick_paper})
     outcome = CliRunner().invoke(train.run.app, [], catch_exceptions=False)
     assert outcome.exit_code == 0
     for shown in ("2/2", "Distance RMSE", "Hausdorff", "Normal error", "95 % interval"):
@@ -31,7 +32,7 @@ def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
 
 
 def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
-    monkeypatch.setattr(train.run, "RECIPES", {"paper": quick_paper})
+    monkeypatch.setattr(train.fitting.command, "RECIPES", {"paper": quick_paper})
     path = tmp_path / "other.safetensors"
     arguments = ["train", "--recipe", "paper", "--seed", "5", "--output", str(path)]
     assert CliRunner().invoke(train.run.app, arguments, catch_exceptions=False).exit_code == 0
@@ -56,7 +57,7 @@ def test_fewer_steps_keep_what_happens_at_a_share_of_them(tmp_path, monkeypatch)
     ],
 )
 def test_what_cannot_be_written_is_told_before_the_work_begins(arguments, tmp_path, monkeypatch):
-    monkeypatch.setattr(train.run, "fit", lambda *_: pytest.fail("it trains"))
+    monkeypatch.setattr(train.fitting.command, "fit", lambda *_: pytest.fail("it trains"))
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     outcome = CliRunner().invoke(
@@ -90,3 +91,14 @@ def test_scripts_run_from_the_repository_root():
     assert done.stdout.count("Usage") == 2
     # It is of a shell's commands, and these are none.
     assert "completion" not in done.stdout
+
+
+def test_help_names_the_commands_and_waits_for_none_of_their_imports():
+    code = "import sys; from train.run import app; app(standalone_mode=False); print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "--help"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    *text, modules = done.stdout.splitlines()
+    for name in ("train", "reproduce", "certify", "validate"):
+        assert any(line.split()[1:2] == [name] for line in text)
+    assert {"torch", "numba", "trimesh"}.isdisjoint(modules.split())

@@ -30,7 +30,6 @@ from OCP.collections import (
 )
 from OCP.GCPnts import GCPnts_AbscissaPoint
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Ax3, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
-from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
@@ -224,6 +223,6 @@ def _finished(
             maker.Add(min(size, LARGEST_FINISH * shortest), edge)
         maker.Build()
         done = maker.Shape() if maker.IsDone() else shape
-    except (RuntimeError, Standard_Failure):
+    except Exception:  # OpenCascade's exceptions share no base class in Python
         return shape
     return done if BRepCheck_Analyzer(done).IsValid() else shape

@@ -5,7 +5,7 @@ import { distances, distanceFrom, largestLength, rounding } from "./measure/dist
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/promises";
 import type { Result } from "./result";
-import { NAMES, type Settings } from "./settings";
+import { nameOf, type Settings } from "./settings";
 import type { Source } from "./tasks";
 import {
   showAdvice,
@@ -73,7 +73,7 @@ function movedBy({ model, report, classic }: Result, { model: file, opened }: So
 }
 
 function lengths(ours: Result, source: Source, loop: Result | null, { size, unit }: Scale): Lengths {
-  const { model, report, classic } = ours;
+  const { model, report } = ours;
   const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
   const measured = loop && distances(model, loop.model);
   return {
@@ -83,7 +83,7 @@ function lengths(ours: Result, source: Source, loop: Result | null, { size, unit
     rounding: rounding(model),
     size,
     unit,
-    rule: NAMES[classic],
+    rule: nameOf(report.base),
   };
 }
 

@@ -5,7 +5,7 @@ import { localProblem } from "./api/problem";
 import { jsonOf, parseGltf, type GltfJson } from "./files/gltf";
 import type { Upload } from "./files/upload";
 import type { Report } from "./report/report";
-import { query, type Asked, type Classic } from "./settings";
+import { isClassic, query, type Asked, type Classic } from "./settings";
 import { modelOf, type Model } from "./view/model";
 
 /** What is asked of the service. */
@@ -44,7 +44,7 @@ export async function resultOf(order: Order, answer: Answer): Promise<Result> {
   const timings: [string, number][] = [...answer.timings, ["opening", performance.now() - began]];
   return {
     ...order,
-    classic: report.base,
+    classic: isClassic(report.base) ? report.base : order.classic,
     key: query(order.asked.settings, order.classic).toString(),
     bytes: answer.bytes,
     json,

@@ -2,7 +2,7 @@
 
 export interface Settings {
   levels: number;
-  /** A model's name; "" for the service's default; "loop" for the classic rule. */
+  /** A model's name; "" for the service's default; "loop" for the classic rule; "scheme:NAME" for another base scheme. */
   model: string;
   /** C, dimensionless; null: the model's own. */
   budget: number | null;
@@ -27,10 +27,33 @@ export interface Asked {
 /** The classic rule, whichever it is for a file. */
 export const LOOP = "loop";
 
+/** Before the name of a base scheme that is none of the classic ones. */
+export const SCHEME = "scheme:";
+
 /** The classic rules: of triangles, and of polygons. */
 export type Classic = "loop" | "catmull-clark";
 
-export const NAMES: Record<Classic, string> = { loop: "Loop", "catmull-clark": "Catmull–Clark" };
+const NAMES: Record<string, string> = { loop: "Loop", "catmull-clark": "Catmull–Clark" };
+
+export function isClassic(base: string): base is Classic {
+  return base in NAMES;
+}
+
+/** A base scheme's name for readers. */
+export function nameOf(base: string): string {
+  return NAMES[base] ?? base;
+}
+
+/** Return the base scheme that is asked for in a model's place; null where a model is. */
+function baseOf({ model }: Settings, classic: Classic): string | null {
+  if (model === LOOP) return classic;
+  return model.startsWith(SCHEME) ? model.slice(SCHEME.length) : null;
+}
+
+/** Whether a model is asked for. */
+export function learns(settings: Settings): boolean {
+  return baseOf(settings, "loop") === null;
+}
 
 /** How near vertices have to be to be joined, in units of R: the length that the service's advice names. */
 const WELD = "0.001";
@@ -61,17 +84,17 @@ export interface Writing {
 
 /** Return the parameters of a job; `classic` is the file's classic rule. What is at the service's default is left out where it may be. */
 export function query(settings: Settings, classic: Classic, writing: Writing = {}): URLSearchParams {
-  const loop = settings.model === LOOP;
+  const base = baseOf(settings, classic);
   const { diagnostics = "summary", compress = "none", format = "glb" } = writing;
   const parameters = new URLSearchParams({
     levels: String(settings.levels),
-    scheme: loop ? classic : settings.model ? "pns" : "auto",
+    scheme: base ?? (settings.model ? "pns" : "auto"),
     diagnostics,
     uv: settings.uv,
     crease: settings.crease === "angle" ? `angle:${settings.angle}` : settings.crease,
   });
-  if (!loop && settings.model) parameters.set("model", settings.model);
-  if (!loop && settings.budget !== null) parameters.set("budget", String(settings.budget));
+  if (!base && settings.model) parameters.set("model", settings.model);
+  if (!base && settings.budget !== null) parameters.set("budget", String(settings.budget));
   if (settings.limit) parameters.set("limit", "true");
   if (settings.weld) parameters.set("weld_tolerance", WELD);
   if (settings.polygons) parameters.set("polygons", "auto");

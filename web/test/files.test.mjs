@@ -101,7 +101,7 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.equal(await page.textContent("#label-right"), label);
     assert.equal(await page.textContent("#file-name"), "part.glb");
     await choose(page, { name: "text.txt", mimeType: "", buffer: Buffer.from("hello") });
-    assert.match(await page.textContent("#problem-title"), /No mesh/);
+    assert.match(await page.textContent("#problem-title"), /^Format not supported$/);
   });
 
   const zipped = Buffer.from(zipSync({ "a.obj": Buffer.from("v 0 0 0") }));

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
-import { positions } from "./support/glb.mjs";
+import { positions, rigged } from "./support/glb.mjs";
 import { CUBE, CUBE_OF_TRIANGLES } from "./support/solids.mjs";
 import { example, number, PART_FACES, same, studio, TETRAHEDRON } from "./support/studio.mjs";
 
@@ -12,7 +12,19 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("the page shows an example at once, refined by the service, until the user has a file", async () => {
     const page = await visit({ live: true });
+    await page.addInitScript(() => {
+      window.said = [];
+      new MutationObserver(() => {
+        const text = document.querySelector("#work-text")?.textContent;
+        if (text) window.said.push(text);
+      }).observe(document, { subtree: true, childList: true });
+    });
+    await page.reload();
     await settled(page);
+    // The visitor has uploaded nothing.
+    const said = await page.evaluate(() => window.said);
+    assert.ok(said.length);
+    assert.deepEqual(said.filter((text) => /Upload|Waiting/.test(text)), []);
     assert.equal(await page.textContent("#file-name"), "example.glb");
     assert.match(await page.textContent("#label-right"), /· 5,952 faces/);
     assert.ok(await page.isVisible("#invitation"));
@@ -165,6 +177,9 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await page.keyboard.press("Shift");
       await tip.waitFor();
       assert.ok((await tip.textContent()).trim().length > 40);
+      // Other settings stay in view.
+      const [box, panel] = [await tip.boundingBox(), await page.locator(".panel").boundingBox()];
+      assert.ok(box.x >= 0 && box.x + box.width <= panel.x && box.y >= 0 && box.y + box.height <= 700, control);
       await page.evaluate(() => document.activeElement.blur());
     }
   });
@@ -305,6 +320,23 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(await page.isHidden("#kept"));
     assert.equal(await page.inputValue("#crease"), "auto");
     await settled(page);
+  });
+
+  test("of a rigged file with many faces the form says what a step less gives", async () => {
+    const page = await visit({ hash: "#levels=3" });
+    const release = await hold(page);
+    const note = () => page.textContent("#levels-note");
+    await choose(page, { ...example, buffer: rigged(example.buffer) });
+    await page.locator("#levels-note", { hasText: "Many faces for a game" }).waitFor();
+    assert.equal(await note(), `Many faces for a game: 1 gives ${number(4 * PART_FACES)}.`);
+    await page.selectOption("#levels", "1");
+    assert.equal(await note(), "");
+    await page.selectOption("#levels", "3");
+    await choose(page, { ...example, name: "still.glb" });
+    await page.locator("#file-name", { hasText: "still.glb" }).waitFor();
+    assert.equal(await note(), "");
+    await page.click("#cancel");
+    release();
   });
 
   test("lengths are in per cent of the model's size first, and the file's unit second", async () => {

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdtemp, readFile, rm } from "node:fs/promises";
+import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createServer, request } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -32,6 +32,29 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await server.close();
     }
   }
+
+  test("a base scheme that the service adds is among the rules", async () => {
+    // The documentation's, in a file and a line of its own: old points stay, new ones halve the edges.
+    const docs = await readFile(new URL("../../docs/reference/python.md", import.meta.url), "utf8");
+    const [, code] = /```python\n([^`]*BaseScheme\([^`]*)```/.exec(docs);
+    const folder = await mkdtemp(join(tmpdir(), "scheme-"));
+    await writeFile(join(folder, "linear.py"), code);
+    const line = 'from pns_common.scheme_names import BASE_SCHEMES\nBASE_SCHEMES["linear"] = "linear:LINEAR"\n';
+    await writeFile(join(folder, "sitecustomize.py"), line);
+    await with_({ PYTHONPATH: folder }, async ({ page }) => {
+      await choose(page, example);
+      await settled(page);
+      await page.click(".more summary");
+      await page.selectOption("#model", { label: "linear" });
+      await page.locator("#label-right", { hasText: "linear" }).waitFor();
+      await settled(page);
+      assert.match(await page.textContent("#promises"), /This is linear’s rule alone\. .* than 0\u00a0% of its size/);
+      await page.selectOption("#look", "distance");
+      await page.waitForFunction(() => Number(document.querySelector("#legend").dataset.max) > 0);
+      assert.match(page.url(), /model=scheme%3Alinear/);
+    });
+    await rm(folder, { recursive: true });
+  });
 
   test("a slow job is seen to move, and cancel frees its worker", async (t) => {
     // A model that acts at every level, and the most faces that the service takes: seconds of work,

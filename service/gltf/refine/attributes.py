@@ -7,16 +7,16 @@ normals are those of the surface that it makes, and its tangents are perpendicul
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from pns_common.grid import rounded_rows
-from pns_common.normals import perpendicular_tangents
+from pns_common.normals import opposed_corners, perpendicular_tangents
 from pns_common.parallel import Blocks, available_threads
-from pns_common.rows import marked
+from pns_common.rows import cross, dot, marked, unit
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
@@ -114,10 +114,69 @@ def refined_primitives(
             if rows.stop > rows.start:
                 own = ids[rows]
                 part = None if cut is None else Cut(cut.kind[rows], cut.still)
-                made.append(
-                    _refined_primitive(control, number, own, grid, refined, shading, uv_blend, part)
+                each = _refined_primitive(
+                    control, number, own, grid, refined, shading, uv_blend, part
                 )
+                before = None
+                if control.authored or control.own is not None:
+                    before = control.primitives[number].corners[control.kept[number]]
+                made.append(_facing(each, before))
     return made
+
+
+def _facing(refined: RefinedPrimitive, before: Int[np.ndarray, "P 3"] | None) -> RefinedPrimitive:
+    """Return a refined primitive of which no normal points away from its face's front.
+
+    At a child face that turned over, the normal and its tangent are mirrored, in a row of their
+    own. `before` are the faces whose normals are the author's: where one of these pointed away, it
+    is meant to, and so are those of its children.
+    """
+    attributes, blocks = refined.attributes, Blocks(available_threads())
+    if "NORMAL" not in attributes:
+        return refined
+    points, normals = attributes["POSITION"], attributes["NORMAL"]
+    opposed = opposed_corners(points, normals, refined.faces, blocks)
+    if before is not None and opposed.any():
+        old = refined.source.attributes
+        meant = opposed_corners(old["POSITION"], old["NORMAL"], before, blocks).any(axis=1)
+        counts = len(opposed) // len(before) if refined.counts is None else refined.counts
+        opposed &= ~np.repeat(meant, counts)[:, None]
+    if not opposed.any():
+        return refined
+    face, corner = np.nonzero(opposed)
+    rows = refined.faces[face, corner]
+    a, b, c = np.moveaxis(points[refined.faces[face]].astype(np.float64), 1, 0)
+    front = unit(cross(b - a, c - a))
+    more = {name: values[rows] for name, values in attributes.items()}
+    for name in {"NORMAL", "TANGENT"} & more.keys():
+        along = more[name][:, :3].astype(np.float64)
+        more[name][:, :3] = along - 2 * dot(along, front)[:, None] * front
+        # A mirror turns a frame's hand.
+        more[name][:, 3:] *= -1
+    targets = []
+    for target in refined.targets:
+        own = {name: values[rows] for name, values in target.items()}
+        # A target's own directions stay as they are.
+        for name in {"NORMAL", "TANGENT"} & own.keys() & more.keys():
+            own[name] += attributes[name][rows, :3] - more[name][:, :3]
+        targets.append(own)
+    faces = refined.faces.copy()
+    faces[face, corner] = len(points) + np.arange(len(rows))
+    # A row may have been those corners' alone.
+    used = np.flatnonzero(marked(faces.reshape(-1), len(points) + len(rows)))
+    pairs = zip((attributes, *refined.targets), (more, *targets), strict=True)
+    attributes, *targets = (
+        {name: np.concatenate([values, new[name]])[used] for name, values in old.items()}
+        for old, new in pairs
+    )
+    vertex = refined.vertex
+    return replace(
+        refined,
+        faces=np.searchsorted(used, faces),
+        attributes=attributes,
+        targets=targets,
+        vertex=None if vertex is None else np.append(vertex, vertex[rows])[used],
+    )
 
 
 def _refined_primitive(

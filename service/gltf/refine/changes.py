@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.normals import count_opposed
+from pns_common.normals import opposed_corners
 from pns_common.parallel import Blocks, available_threads
 from pns_common.rows import dot, extent
 from pns_common.topology import Topology
@@ -77,11 +78,15 @@ def changes_of_primitive(
     return [Change(pointer, what, count) for what, count in counts.items() if count]
 
 
-def changes_of_vertices(near: int, cut: int, pointer: str) -> list[Change]:
-    """Return the number of joined vertices of a mesh, and of refined ones that lost a joint."""
+def changes_of_vertices(near: int, cut: int, lost: float, pointer: str) -> list[Change]:
+    """Return the number of joined vertices of a mesh, and of refined ones that lost a joint.
+
+    `lost` is the largest share of a vertex's weight that its lost joints had.
+    """
     counts = {
         "vertices joined within weld_tolerance": near,
-        "refined vertices that lost their lightest joints": cut,
+        f"refined vertices that lost their lightest joints, at most {ceil(100 * lost)} % of the "
+        "weight": cut,
     }
     return [Change(pointer, what, count) for what, count in counts.items() if count]
 
@@ -90,8 +95,10 @@ def opposed_normals(refined: Sequence[RefinedPrimitive], pointer: str) -> list[C
     """Return how many normals of each primitive of the mesh at `pointer` oppose their face."""
     blocks = Blocks(available_threads())
     counts = {
-        part.source.number: count_opposed(
-            part.attributes["POSITION"], part.attributes["NORMAL"], part.faces, blocks
+        part.source.number: int(
+            opposed_corners(
+                part.attributes["POSITION"], part.attributes["NORMAL"], part.faces, blocks
+            ).sum()
         )
         for part in refined
         if "NORMAL" in part.attributes

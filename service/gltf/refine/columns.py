@@ -44,7 +44,6 @@ _SET = re.compile(r"WEIGHTS_([0-9]+)")
 _NO_JOINT = np.iinfo(np.int64).max
 # Joints have at most two bytes.
 _JOINTS = 2**16
-_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +70,12 @@ class SkinAndMorph:
     Attributes:
         binding: None for a mesh without skin.
         deltas: for each morph target, the displacement of each vertex.
-        cut: vertices that lost a joint for lack of slots.
+        lost: share of the weight that each vertex lost for lack of slots; None: nothing.
     """
 
     binding: Binding | None
     deltas: tuple[Float[np.ndarray, "N 3"], ...]
-    cut: Int[np.ndarray, " n"]
+    lost: Float[np.ndarray, " N"] | None = None
 
     @property
     def any(self) -> bool:
@@ -95,7 +94,7 @@ class SkinAndMorph:
     def take(self, rows: Int[np.ndarray, " M"]) -> SkinAndMorph:
         """Return skin and morph of some of the vertices."""
         binding = None if self.binding is None else self.binding.take(rows)
-        return SkinAndMorph(binding, tuple(np.take(d, rows, axis=0) for d in self.deltas), _NONE)
+        return SkinAndMorph(binding, tuple(np.take(d, rows, axis=0) for d in self.deltas))
 
 
 def skin_sets(primitive: TrianglePrimitive) -> list[int]:
@@ -108,7 +107,7 @@ def read_skin_and_morph(primitives: Sequence[TrianglePrimitive]) -> SkinAndMorph
     """Read skin and morph of a mesh's rows, primitive after primitive."""
     count = max(len(primitive.targets) for primitive in primitives)
     deltas = [np.concatenate([_delta(p, target) for p in primitives]) for target in range(count)]
-    return SkinAndMorph(read_binding(primitives), tuple(deltas), _NONE)
+    return SkinAndMorph(read_binding(primitives), tuple(deltas))
 
 
 def _delta(primitive: TrianglePrimitive, target: int) -> Float[np.ndarray, "N 3"]:
@@ -168,20 +167,21 @@ def refined_skin_and_morph(
     course: Course,
     parts: Parts | None = None,
     base: BaseScheme = LOOP,
-) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
-    """Refine skin and morph; return also the number of vertices of each part that lost a joint.
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
+    """Refine skin and morph; return also how many vertices of each part lost a joint.
 
+    The last of the three is the largest share of its weight that one of them lost.
     `topologies` are those of the meshes that were refined, level by level, by a base scheme.
     """
     if not control.skin_and_morph.any:
-        return control.skin_and_morph, np.zeros(1, dtype=np.int64)
+        return control.skin_and_morph, np.zeros(1, dtype=np.int64), np.zeros(1)
     mesh, rows = control.mesh, control.vertex_rows()
     before = control.skin_and_morph.take(rows)
     linear = ColumnRefinement(topologies, base, options.limit, Blocks(available_threads()))
     slots = _common_slots(control, refined_faces, linear.count)
     if parts is None:
         after = _refined(before, linear, slots, course)
-        return after, np.array([len(after.cut)])
+        return after, *_losses(after.lost, None, 1)
     part = parts.of_row[rows]
     table = None
     if before.binding is not None:
@@ -194,7 +194,20 @@ def refined_skin_and_morph(
     part_after[refined_faces] = of_face[:, None]
     if table is not None and after.binding is not None:
         after = replace(after, binding=table.named(after.binding, part_after))
-    return after, np.bincount(part_after[after.cut], minlength=parts.count)
+    return after, *_losses(after.lost, part_after, parts.count)
+
+
+def _losses(
+    lost: Float[np.ndarray, " V"] | None, part: Int[np.ndarray, " V"] | None, count: int
+) -> tuple[Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
+    """Return how many vertices of each part lost weight, and the most that one of them lost."""
+    largest = np.zeros(count)
+    if lost is None:
+        return np.zeros(count, dtype=np.int64), largest
+    rows = np.flatnonzero(lost > NOTHING)
+    whose = np.zeros(len(rows), dtype=np.int64) if part is None else part[rows]
+    np.maximum.at(largest, whose, lost[rows])
+    return np.bincount(whose, minlength=count), largest
 
 
 def _refined(
@@ -204,20 +217,20 @@ def _refined(
     course: Course,
 ) -> SkinAndMorph:
     """Refine skin and morph; deltas in float32, in which they are written."""
-    binding, cut = None, _NONE
+    binding, lost = None, None
     if before.binding is not None:
-        binding, cut = _refined_binding(before.binding, linear, slots, course)
+        binding, lost = _refined_binding(before.binding, linear, slots, course)
     deltas: list[Float[np.ndarray, "V 3"]] = []
     for delta in before.deltas:
         course.reach(1.0)
         deltas.append(linear(delta.astype(np.float64)).astype(np.float32))
-    return SkinAndMorph(binding, tuple(deltas), cut)
+    return SkinAndMorph(binding, tuple(deltas), lost)
 
 
 def _refined_binding(
     binding: Binding, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None, course: Course
-) -> tuple[Binding, Int[np.ndarray, " V"]]:
-    """Refine a binding; return also the vertices that lost a joint for lack of slots.
+) -> tuple[Binding, Float[np.ndarray, " V"]]:
+    """Refine a binding; return also the share of its weight that each vertex lost.
 
     `slots` are those of each refined vertex; None: all have the binding's. The course is reported
     between blocks of joints, of which a small file may have tens of thousands.
@@ -242,7 +255,7 @@ def _refined_binding(
         lost += np.where(beyond, weights, 0).sum(axis=1)
         joints[beyond], weights[beyond] = 0, 0
     scale_rows(weights, blocks)
-    return Binding(joints, weights), np.flatnonzero(lost > NOTHING)
+    return Binding(joints, weights), lost
 
 
 def skin_attributes(

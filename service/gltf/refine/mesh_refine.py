@@ -38,7 +38,8 @@ class RefinedMesh:
         mesh: the refined mesh.
         reports: of the operator, one for each part.
         skin_and_morph: skin binding and morph deltas.
-        cut: (P,) vertices of each part that lost a joint for lack of slots.
+        cut: (P,) number of vertices of each part that lost a joint for lack of slots.
+        lost: (P,) the largest share of a vertex's weight that these had.
         scalars: further attributes by name.
         limit_normals: normals to use in place of those of the faces; None: none.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
@@ -49,6 +50,7 @@ class RefinedMesh:
     reports: list[Report]
     skin_and_morph: SkinAndMorph
     cut: Int[np.ndarray, " P"]
+    lost: Float[np.ndarray, " P"]
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
     parents: SubdivisionMatrix | None = None
@@ -189,20 +191,20 @@ def _skin_and_morph_of_union(
     creases: Creases,
     options: Options,
     course: Course,
-) -> tuple[SkinAndMorph, Int[np.ndarray, " P"]]:
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
     """Refine skin and morph of a union whose refined faces are given."""
     if not control.skin_and_morph.any:
-        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64)
+        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64), np.zeros(parts.count)
     blocks, mesh = Blocks(available_threads()), control.mesh
     levels = level_topologies(
         mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
     )
     own = split_faces(levels[-1], blocks, np.int64)
-    refined, cut = refined_skin_and_morph(control, own, levels, options, course, parts)
+    refined, cut, lost = refined_skin_and_morph(control, own, levels, options, course, parts)
     # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
     vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
     vertex[faces] = own
-    return refined.take(vertex), cut
+    return refined.take(vertex), cut, lost
 
 
 def _jobs(

@@ -242,8 +242,9 @@ def refine_alone(
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
         for change in changes_of_primitive(primitive, keep, options.levels, pointer)
     ]
-    (near,), (cut,) = control.near.tolist(), [0] if made is None else made.cut.tolist()
-    changes += changes_of_vertices(near, cut, pointer)
+    (near,) = control.near.tolist()
+    (cut,), (lost,) = ([0], [0.0]) if made is None else (made.cut.tolist(), made.lost.tolist())
+    changes += changes_of_vertices(near, cut, lost, pointer)
     if made is not None and made.topology is not None:
         length = made.reports[0]["reference_length"]
         (misses,) = near_misses(control.surface.vertices, made.topology, [length])

@@ -309,7 +309,9 @@ def _divided(
             for primitive, keep in zip(primitives, own, strict=True)
             for change in changes_of_primitive(primitive, keep, options.levels, pointer)
         ]
-        changes += changes_of_vertices(near[part], int(made.cut[part]), pointer)
+        changes += changes_of_vertices(
+            near[part], int(made.cut[part]), float(made.lost[part]), pointer
+        )
         changes += near_miss_changes(misses[part], pointer)
         changes += opposed_normals(refined[part], pointer)
         outcomes.append(

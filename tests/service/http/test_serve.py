@@ -22,6 +22,7 @@ import httpx2
 import pytest
 
 from service.meshfiles.example import part_glb
+from tests.support.added_scheme import TRIANGLE, halved, with_linear
 from tests.support.packages import served_file
 
 PNS = Path(sys.executable).with_name("pns")
@@ -81,9 +82,10 @@ class Server:
 
 
 @contextmanager
-def serving(*arguments: str, **environment: str) -> Iterator[Server]:
+def serving(*arguments: str, stdout: int | None = None, **environment: str) -> Iterator[Server]:
     process = subprocess.Popen(
         [str(PNS), "serve", "--port", "0", *arguments],
+        stdout=stdout,
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"PNS_METRICS_PORT": "0"} | environment,
@@ -170,6 +172,37 @@ def default_models(server: Server) -> list[str]:
     """Names of the listed models that are the default."""
     listed = json.loads(server.get("/models")[1])
     return [entry["name"] for entry in listed if entry["default"]]
+
+
+@pytest.mark.parametrize(("host", "opened"), [("127.0.0.1", True), ("0.0.0.0", False)])
+def test_a_line_names_the_address_to_open_where_this_machine_alone_is_served(
+    host: str, opened: bool
+) -> None:
+    with serving("--host", host, stdout=subprocess.PIPE) as server:
+        server.process.terminate()
+        assert server.process.stdout is not None
+        said = server.process.stdout.read()
+    assert said == (f"Open http://127.0.0.1:{server.port}\n" if opened else "")
+
+
+def test_a_file_and_a_line_make_a_base_scheme_known_over_http(tmp_path: Path) -> None:
+    with serving(PNS_WORKERS="1", **with_linear(tmp_path)) as server:
+        server.wait_until_ready()
+        assert json.loads(server.get("/limits")[1])["schemes"] == [
+            "loop",
+            "catmull-clark",
+            "linear",
+        ]
+        query, obj = "scheme=linear&levels=1", {"Content-Type": "model/obj"}
+        with closing(server.connect()) as connection:
+            connection.request("POST", f"/subdivide?{query}&format=obj", TRIANGLE, obj)
+            refined = connection.getresponse().read().decode()
+            assert halved(refined), refined
+            connection.request("POST", f"/report?{query}", TRIANGLE, obj)
+            assert json.loads(connection.getresponse().read())["base"] == "linear"
+            connection.request("POST", f"/jobs?{query}", TRIANGLE, obj)
+            answer = connection.getresponse()
+            assert answer.status == 202, answer.read()
 
 
 def test_the_service_survives_more_connections_at_once_than_it_has_descriptors() -> None:

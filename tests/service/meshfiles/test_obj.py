@@ -7,6 +7,7 @@ from service.errors import UnreadableError, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.counted import count_triangles
 from service.meshfiles.mesh_file import MATERIAL, UV
+from service.meshfiles.obj import read_obj, write_obj
 from service.meshfiles.parts import chosen_of
 from service.options import Options
 
@@ -145,3 +146,9 @@ def test_words_of_comments_are_no_corners():
     text = POSITIONS + "f 1 2 3 # of a lid, seen from above\n# f 1 2 3 4 5 6\nf 1 2 3 4#5 6\n"
     assert count_triangles(text.encode(), "obj") == 3
     assert count_triangles(text.replace("\n", "\r").encode(), "obj") == 3
+
+
+def test_an_object_is_named_before_its_vertices():
+    text = write_obj(read_obj(b"v 0 0 0\nv 1 0 0\nv 0 1 0\no Cube\nf 1 2 3\n")).decode()
+    assert text.splitlines()[0] == "o Cube"
+    assert text.count("o Cube") == 1

@@ -7,6 +7,8 @@ export interface Limits {
   faces: number;
   levels: { min: number; max: number };
   seconds?: number;
+  /** Base schemes: the classic ones and those that this service adds. */
+  schemes?: string[];
 }
 
 export interface ModelEntry {

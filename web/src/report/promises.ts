@@ -50,8 +50,8 @@ function classic(lengths: Lengths): Promised {
   const kept = proved ? ` Sharp edges keep it within ${length(proved, unit)} of the surface without them.` : "";
   return {
     holds: true,
-    title: "Classic",
-    text: `This is ${rule}’s classic rule: nothing learned took part. ${movedBy(lengths)}`.trim(),
+    title: "Nothing learned",
+    text: `This is ${rule}’s rule alone. ${movedBy(lengths)}`.trim(),
     mathematics: `Distance to ${rule}’s limit surface with the same creases: ${length(0, unit)}.${kept}`,
   };
 }

@@ -1,7 +1,5 @@
 /** The service's report, as far as the page reads it. */
 
-import type { Classic } from "../settings";
-
 export interface Summary {
   max: number;
   mean: number;
@@ -21,7 +19,7 @@ export interface Level {
 
 export interface Report {
   scheme: string;
-  base: Classic;
+  base: string;
   budget: number | null;
   model: string | null;
   model_hash: string | null;

@@ -2,7 +2,7 @@
 
 import { counted } from "../report/format";
 import type { Result } from "../result";
-import { NAMES } from "../settings";
+import { isClassic, nameOf } from "../settings";
 import type { Source } from "../tasks";
 import type { Layout } from "../view/viewer";
 import { element, make } from "./dom";
@@ -31,10 +31,11 @@ function labels(
   layout: Layout,
 ): [Label | null, Label | null] {
   const of = ({ report }: Result): string => counted(report.totals.faces, "face");
-  const text = ours ? `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : "Classic"} · ${of(ours)}` : "";
+  const rule = ({ report }: Result): string => (isClassic(report.base) ? "Classic" : nameOf(report.base));
+  const text = ours ? `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : rule(ours)} · ${of(ours)}` : "";
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
   const after = ours && { title: "After", text };
   if (layout === "overlay" || layout === "single") return [null, after ?? before];
-  if (loop && ours) return [{ title: `Classic (${NAMES[loop.classic]})`, text: of(loop) }, { title: "After", text }];
+  if (loop && ours) return [{ title: `Classic (${nameOf(loop.classic)})`, text: of(loop) }, { title: "After", text }];
   return [before, after];
 }

@@ -1,7 +1,7 @@
 /** The bundled models, each in a sentence. */
 
 import type { ModelEntry } from "../api/client";
-import { LOOP } from "../settings";
+import { LOOP, SCHEME } from "../settings";
 
 const SENTENCES: Record<string, string> = {
   general: "Recommended: keeps what is sharp and does not shrink.",
@@ -18,5 +18,5 @@ export function ruleName({ name, default: isDefault }: ModelEntry): string {
 }
 
 export function describeModel(name: string): string {
-  return SENTENCES[name] ?? "";
+  return SENTENCES[name] ?? (name.startsWith(SCHEME) ? "A formula of this service: nothing is learned." : "");
 }

@@ -2,7 +2,7 @@
 
 import type { Limits, ModelEntry } from "../api/client";
 import { count } from "../report/format";
-import { DEFAULTS, LOOP, type Asked, type Settings } from "../settings";
+import { DEFAULTS, isClassic, learns, LOOP, SCHEME, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
 import { describeModel, ruleName } from "./models";
 
@@ -122,10 +122,11 @@ export class SettingsForm {
       option(model.default ? "" : model.name, ruleName(model)),
     );
     if (!bundled.length) bundled.push(option("", "Learned"));
-    select("model").replaceChildren(...bundled, option(LOOP, "Classic"));
+    const added = (this.limits?.schemes ?? []).filter((name) => !isClassic(name)).map((name) => option(SCHEME + name, name));
+    select("model").replaceChildren(...bundled, option(LOOP, "Classic"), ...added);
     select("model").value = settings.model;
-    // Before the list is there, a link may name a model of it.
-    const isUnknown = select("model").value !== settings.model && this.models.length > 0;
+    // Before the lists are there, a link may name a rule of them.
+    const isUnknown = select("model").value !== settings.model && this.models.length > 0 && this.limits !== null;
     if (isUnknown) select("model").value = settings.model = this.wanted.model = "";
     input("limit").checked = settings.limit;
     select("crease").value = settings.crease;
@@ -176,10 +177,10 @@ export class SettingsForm {
     const share = settings.budget === null || !model ? 1 : settings.budget / model.budget;
     const percent = Math.round(100 * share);
     input("strength").value = String(percent);
-    input("strength").disabled = settings.model === LOOP || !model;
-    element("strength-text").textContent = settings.model === LOOP ? "–" : `${percent} %`;
+    input("strength").disabled = !learns(settings) || !model;
+    element("strength-text").textContent = learns(settings) ? `${percent} %` : "–";
     element("kept").hidden = Object.entries(this.wanted).every(([name, value]) => value === DEFAULTS[name as keyof Settings]);
     element("angle-row").hidden = settings.crease !== "angle";
-    element("model-note").textContent = describeModel(settings.model === LOOP ? LOOP : model?.name ?? "");
+    element("model-note").textContent = describeModel(learns(settings) ? model?.name ?? "" : settings.model);
   }
 }

@@ -6,10 +6,11 @@ import { dihedrals } from "../measure/dihedral";
 import { distances, type Field } from "../measure/distance";
 import { angle, figure, length, percent, type Unit } from "../report/format";
 import { isLearned, learnedLevels } from "../report/report";
+import { isClassic } from "../settings";
 import { heatRange } from "./looks";
 import type { Model } from "./model";
 
-const BY_LOOP = "This result is the classic rule’s: nothing learned took part.";
+const UNLEARNED = "Nothing learned took part in this result.";
 
 export type Heat = "distance" | "ratio" | "gate" | "dihedral";
 
@@ -75,7 +76,7 @@ function clipped({ values, max }: Field): number {
 }
 
 function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
-  if (!isLearned(ours.report) && heat !== "dihedral") return zeros(ours.model);
+  if (isZero(heat, ours)) return zeros(ours.model);
   switch (heat) {
     case "distance":
       return loop && distances(ours.model, loop.model);
@@ -86,7 +87,12 @@ function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
   }
 }
 
-/** Zeros: nothing is learned in the classic rule's own result. */
+/** Whether there is nothing to show: nothing is learned in a formula's own result. */
+function isZero(heat: Heat, { report }: Result): boolean {
+  if (isLearned(report) || heat === "dihedral") return false;
+  return heat !== "distance" || isClassic(report.base);
+}
+
 function zeros(model: Model): Field {
   const values = model.meshes.map(({ geometry }) => new Float32Array(geometry.getAttribute("position").count));
   return { values, max: 0 };
@@ -110,12 +116,12 @@ interface Description {
   note: string;
 }
 
-function describe(heat: Heat, { report }: Result, { size, unit }: Scale): Description {
-  const isClassic = !isLearned(report) && heat !== "dihedral";
+function describe(heat: Heat, ours: Result, { size, unit }: Scale): Description {
+  const { report } = ours;
   const last = learnedLevels(report) || report.levels.length;
   const carried = last < report.levels.length ? " Later vertices have the mean of their edge’s ends." : "";
   const described = DESCRIPTIONS[heat](last, carried, { size, unit });
-  return isClassic ? { ...described, note: BY_LOOP } : described;
+  return isZero(heat, ours) ? { ...described, note: UNLEARNED } : described;
 }
 
 const DESCRIPTIONS: Record<Heat, (level: number, carried: string, scale: Scale) => Description> = {

@@ -65,6 +65,30 @@ export function moving(bytes, way) {
   return write({ json, bin: whole });
 }
 
+/** The same file, whose first mesh moves by one joint. */
+export function rigged(bytes) {
+  const { json, bin } = read(bytes);
+  const { attributes } = json.meshes[0].primitives[0];
+  const { count } = json.accessors[attributes.POSITION];
+  const start = padded(bin, 0).length;
+  const view = json.bufferViews.length;
+  json.bufferViews.push({ buffer: 0, byteOffset: start, byteLength: 4 * count }, { buffer: 0, byteOffset: start + 4 * count, byteLength: 16 * count });
+  attributes.JOINTS_0 = json.accessors.length;
+  attributes.WEIGHTS_0 = json.accessors.length + 1;
+  json.accessors.push(
+    { bufferView: view, componentType: 5121, count, type: "VEC4" },
+    { bufferView: view + 1, componentType: 5126, count, type: "VEC4" },
+  );
+  const weights = Float32Array.from({ length: 4 * count }, (_, i) => Number(i % 4 === 0));
+  json.nodes.push({ name: "Joint" });
+  json.scenes[0].nodes.push(json.nodes.length - 1);
+  json.skins = [{ joints: [json.nodes.length - 1] }];
+  json.nodes.find(({ mesh }) => mesh === 0).skin = 0;
+  const whole = Buffer.concat([padded(bin, 0), Buffer.alloc(4 * count), Buffer.from(weights.buffer)]);
+  json.buffers[0].byteLength = whole.length;
+  return write({ json, bin: whole });
+}
+
 /** A tetrahedron with neither normals nor a material. */
 export function bare() {
   const positions = Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]).buffer);

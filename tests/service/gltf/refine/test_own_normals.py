@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from pns_common import load_model
+from pns_common.normals import opposed_corners
+from pns_common.parallel import Blocks
 from service.gltf.refine.normals import own_shares
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
+from tests.support.shared import shared_path
 
 
 def subdivide(*meshes, **options):
@@ -110,3 +114,51 @@ def test_no_seam_is_seen_where_two_meshes_meet_that_were_shaded_as_one(levels):
     assert len(border) > 2 * 2**levels
     for place in border:
         np.testing.assert_allclose(one[place], other[place], atol=1e-6)
+
+
+def folding():
+    """A flat square with thin triangles, some of whose children turn over under Loop's rules."""
+    x = [0, 1, 1, 0, 0.51, 0.14, 0.31]
+    y = [0, 0, 1, 1, 0.95, 0.95, 0.42]
+    faces = [2, 6, 1, 1, 6, 0, 6, 3, 0, 3, 4, 2, 4, 6, 2, 6, 5, 3, 5, 4, 3, 4, 5, 6]
+    points = np.column_stack([x, y, np.zeros(7)])
+    up, along = np.tile([0.0, 0, 1], (7, 1)), np.tile([1.0, 0, 0, 1], (7, 1))
+    faces = np.array(faces).reshape(-1, 3)
+    return {"POSITION": points, "NORMAL": up, "TANGENT": along, "indices": faces}
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+@pytest.mark.parametrize("normals", ["keep", "smooth"])
+def test_where_a_flat_side_folds_each_face_has_its_own_front(normals, copies):
+    data = subdivide(*[[folding()]] * copies, levels=2, normals=normals)
+    for mesh in range(copies):
+        faces, after = files.primitive_of(data, mesh)
+        a, b, c = np.moveaxis(after["POSITION"][faces.reshape(-1, 3)], 1, 0)
+        front = np.sign(np.cross(b - a, c - a)[:, 2])
+        assert (front < 0).any()
+        made = after["NORMAL"][faces.reshape(-1, 3)]
+        np.testing.assert_allclose(made[..., 2], np.tile(front[:, None], 3), atol=1e-6)
+        # The frame's third direction stays as it was.
+        tangents = after["TANGENT"][faces.reshape(-1, 3)]
+        third = np.cross(made, tangents[..., :3]) * tangents[..., 3:]
+        np.testing.assert_allclose(third, np.broadcast_to([0, 1, 0], third.shape), atol=1e-6)
+
+
+def test_normals_that_pointed_away_before_are_their_author_s():
+    shape = folding()
+    down = {**shape, "NORMAL": -shape["NORMAL"]}
+    _, after = files.primitive_of(subdivide([down], levels=2))
+    np.testing.assert_allclose(after["NORMAL"][:, 2], -1, atol=1e-6)
+
+
+def test_no_normal_of_the_knight_points_away():
+    data = shared_path("assets/Knight.glb").read_bytes()
+    for normals in ("keep", "smooth"):
+        options = Options(levels=2, normals=normals)
+        result = subdivide_gltf(data, "glb", options, load_model(), Limits())
+        assert not [c for c in result.report["changes"] if "points away" in c["what"]]
+        tree, _ = files.unpack(result.glb)
+        for mesh in range(len(tree["meshes"])):
+            faces, after = files.primitive_of(result.glb, mesh)
+            corners = after["POSITION"], after["NORMAL"], faces.reshape(-1, 3)
+            assert not opposed_corners(*corners, Blocks()).any()
