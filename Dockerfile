@@ -10,8 +10,8 @@ COPY pyproject.toml setup.py README.md LICENSE ./
 COPY pns_common pns_common
 COPY service service
 # Our own package alone has no hash: it is built here, from these files, by what is pinned above.
-# What is never loaded goes: libraries' tests, tools and sources in C, stubs, lexers, and onnxruntime's library
-# for other languages.
+# What is never loaded goes: libraries' tests, tools, kernels of GPUs and sources in C, stubs, lexers, and the
+# libraries for other languages.
 RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/build/bin/python -m pip wheel --no-build-isolation --no-deps --no-index --wheel-dir /src/dist . \
  && /opt/pns/bin/python -m pip install --no-deps --no-index dist/*.whl \
@@ -19,11 +19,13 @@ RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/build/bin/cyclonedx-py environment /opt/pns/bin/python --output-reproducible --of JSON -o /opt/pns/sbom.cdx.json \
  && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip \
  && find /opt/pns/lib -type d \( -name test -o -name tests -o -name transformers -o -name f2py \
-      -o -path '*/onnx/reference' -o -path '*/onnxruntime/quantization' -o -path '*/onnxruntime/tools' \) \
+      -o -path '*/onnx/reference' -o -path '*/onnxruntime/quantization' -o -path '*/onnxruntime/tools' \
+      -o -path '*/numba/cuda' \) \
       -prune -exec rm -r {} + \
  && find /opt/pns/lib -regextype posix-extended -type f \
-      -regex '.*(\.(pyi|pxd|h|c|cc|cpp|a|proto)|/pygments/lexers/(__pycache__/)?[a-z][^/]*)' -delete \
- && rm /opt/pns/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.*
+      -regex '.*(\.(pyi|pxd|h|c|cc|cpp|a|proto)|/pygments/lexers/(__pycache__/)?([a-z]|_.*_b)[^/]*)' -delete \
+ && rm -r /opt/pns/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.* \
+      /opt/pns/bin/draco_* /opt/pns/include /opt/pns/share
 # Kernels for any processor of the architecture, not only the one that builds.
 ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
 # From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of

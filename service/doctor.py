@@ -83,9 +83,9 @@ def _kernels() -> str:
 
 
 def _providers() -> str:
-    import onnxruntime  # pyright: ignore[reportMissingTypeStubs]
+    from pns_common.model.session import onnx_runtime
 
-    return ", ".join(onnxruntime.get_available_providers())
+    return ", ".join(onnx_runtime().get_available_providers())
 
 
 def _models() -> str:

@@ -7,6 +7,7 @@ chunk it stands in, on its neighbours or on the number of threads.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -252,10 +253,16 @@ class OnnxModel:
         return session
 
 
-def _open_session(data: bytes, name: str, providers: Sequence[str]) -> Any:
+def onnx_runtime() -> Any:
+    """Import onnxruntime, which reports its use to its makers unless it is told not to."""
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
     import onnxruntime  # pyright: ignore[reportMissingTypeStubs]  # lazy: half of the import time
 
-    runtime: Any = onnxruntime
+    return onnxruntime
+
+
+def _open_session(data: bytes, name: str, providers: Sequence[str]) -> Any:
+    runtime = onnx_runtime()
     available = runtime.get_available_providers()
     if not providers or any(provider not in available for provider in providers):
         expected = f"some of {', '.join(available)}"

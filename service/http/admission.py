@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from dataclasses import dataclass
 
 from ..errors import BusyError
 
@@ -15,6 +16,10 @@ class DrainingError(BusyError):
 
     code = "draining"
     title = "The service is shutting down"
+
+
+class CutOffError(Exception):
+    """A client was too slow to take its answer, and the memory is needed."""
 
 
 class Admission:
@@ -28,8 +33,8 @@ class Admission:
         self.draining = False
         self._uploads = _Places("uploads", uploads)
         self._jobs = _Places("jobs", None)
-        self._answers = _Answers(answer_bytes)
-        self._bodies = _Bodies(body_bytes)
+        self._answers = _Shares(answer_bytes)
+        self._bodies = _Shares(body_bytes)
 
     @property
     def admitted(self) -> int:
@@ -49,11 +54,9 @@ class Admission:
         async with self._uploads.held():
             yield
 
-    @asynccontextmanager
-    async def working(self) -> AsyncIterator[None]:
+    def working(self) -> AbstractAsyncContextManager[None]:
         """Be under way, until `end` says otherwise. Raises DrainingError."""
-        async with self._jobs.held():
-            yield
+        return self._jobs.held()
 
     @asynccontextmanager
     async def answering(self, client: str, size: int) -> AsyncIterator[None]:
@@ -65,17 +68,17 @@ class Admission:
             CutOffError: it was this one.
             BusyError: nobody who takes an answer holds as much as this client would.
         """
-        async with self._answers.held(client, size):
-            yield
+        with self._answers.share(client) as answer:
+            if not answer.take(size, own_first=True):
+                raise BusyError("the answers that others take leave no room for this one")
+            async with answer.giving_way(CutOffError):
+                yield
 
     @contextmanager
     def body(self, client: str) -> Iterator[Body]:
         """Keep account of a body, from before its first piece to the end of its job."""
-        body = Body(client, self._bodies)
-        try:
-            yield body
-        finally:
-            self._bodies.forget(body)
+        with self._bodies.share(client) as share:
+            yield Body(share)
 
     def end_uploads(self) -> None:
         """End what still sends its body."""
@@ -90,10 +93,8 @@ class Admission:
 class Body:
     """Counts of one body."""
 
-    def __init__(self, client: str, bodies: _Bodies) -> None:
-        self.client = client
-        self.size = 0
-        self._bodies = bodies
+    def __init__(self, share: _Share) -> None:
+        self._share = share
 
     def grow(self, size: int) -> None:
         """Count a piece before it is kept.
@@ -105,64 +106,15 @@ class Body:
             BusyError: nobody has; or this client would hold more than three quarters of all, so
                 that it alone never locks out others.
         """
-        self._bodies.grow(self, size)
+        if not self._share.take(size, most=3 / 4):
+            raise BusyError("the bodies that are held leave no room for this one")
 
     @asynccontextmanager
     async def arriving(self) -> AsyncIterator[None]:
         """Be on the way, and perhaps give way. Raises BusyError."""
-        async with self._bodies.arriving(self):
+        async with self._share.giving_way(_given_way):
             yield
-
-
-class _Bodies:
-    """The bodies of all clients; who still sends may have to give way, a job's body never."""
-
-    def __init__(self, max_bytes: int) -> None:
-        self._max_bytes = max_bytes
-        # By client; who holds nothing is not there.
-        self._held: Counter[str] = Counter()
-        # The oldest first.
-        self._arriving: dict[Body, asyncio.Timeout] = {}
-
-    def grow(self, body: Body, size: int) -> None:
-        mine = self._held[body.client] + size
-        leaving = self._who_leaves(mine, size)
-        if leaving is None or mine > self._max_bytes * 3 // 4:
-            raise BusyError("the bodies that are held leave no room for this one")
-        for other in leaving:
-            _tell(self._arriving.pop(other))
-            self.forget(other)
-        self._held[body.client] += size
-        body.size += size
-
-    def _who_leaves(self, mine: int, size: int) -> list[Body] | None:
-        """Return who gives way to one of `mine` bytes in all; None where that is not enough."""
-        held = self._held.copy()
-        leaving: list[Body] = []
-        while held.total() + size > self._max_bytes:
-            left = (other for other in self._arriving if other.size and other not in leaving)
-            greedier = [other for other in left if held[other.client] > mine]
-            if not greedier:
-                return None
-            leaving.append(max(greedier, key=lambda other: held[other.client]))
-            held[leaving[-1].client] -= leaving[-1].size
-        return leaving
-
-    def forget(self, body: Body) -> None:
-        self._held[body.client] -= body.size
-        body.size = 0
-        if not self._held[body.client]:
-            del self._held[body.client]
-
-    @asynccontextmanager
-    async def arriving(self, body: Body) -> AsyncIterator[None]:
-        try:
-            async with _until_told(_given_way) as end:
-                self._arriving[body] = end
-                yield
-        finally:
-            told = self._arriving.pop(body, None) is None
-        if told:
+        if self._share.told:
             # It was whole in the same moment: its bytes are another's already.
             raise _given_way()
 
@@ -171,43 +123,70 @@ def _given_way() -> BusyError:
     return BusyError("this body has given way to one of a client who holds less")
 
 
-class CutOffError(Exception):
-    """A client was too slow to take its answer, and the memory is needed."""
+class _Shares:
+    """Shares of so many bytes: what each client holds, and who of them may have to give way."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        # By client; who holds nothing is not there.
+        self.held: Counter[str] = Counter()
+        # The oldest first.
+        self.leaving: dict[_Share, asyncio.Timeout] = {}
+
+    @contextmanager
+    def share(self, client: str) -> Iterator[_Share]:
+        share = _Share(client, self)
+        try:
+            yield share
+        finally:
+            share.give_back()
 
 
-class _Answers:
-    """The answers that are being taken, the oldest first: whose, and of how many bytes."""
+@dataclass(eq=False)
+class _Share:
+    client: str
+    all: _Shares
+    size: int = 0
+    told: bool = False
 
-    def __init__(self, max_bytes: int) -> None:
-        self._max_bytes = max_bytes
-        self._taken: dict[asyncio.Timeout, tuple[str, int]] = {}
+    def take(self, size: int, *, most: float = 1.0, own_first: bool = False) -> bool:
+        """Hold more bytes; return whether there is room, `most` of it for one client.
+
+        Others give way whose client holds more than this one; or as much, with `own_first`, so that
+        one without others is never too large.
+        """
+        held = self.all.held + Counter({self.client: size})
+        if held[self.client] > most * self.all.room and not own_first:
+            return False
+        left = [other for other in self.all.leaving if other.size]
+        gone: list[_Share] = []
+        while held.total() > self.all.room and not (own_first and not left):
+            greedier = [one for one in left if held[one.client] + own_first > held[self.client]]
+            if not greedier:
+                return False
+            gone.append(max(greedier, key=lambda other: held[other.client]))
+            left.remove(gone[-1])
+            held[gone[-1].client] -= gone[-1].size
+        for other in gone:
+            other.told = True
+            other.give_back()
+            _tell(self.all.leaving.pop(other))
+        self.all.held[self.client] += size
+        self.size += size
+        return True
+
+    def give_back(self) -> None:
+        self.all.held -= Counter({self.client: self.size})
+        self.size = 0
 
     @asynccontextmanager
-    async def held(self, client: str, size: int) -> AsyncIterator[None]:
-        self._make_room(client, size)
-        async with _until_told(CutOffError) as end:
-            self._taken[end] = client, size
+    async def giving_way(self, error: Callable[[], Exception]) -> AsyncIterator[None]:
+        async with _until_told(error) as end:
+            self.all.leaving[self] = end
             try:
                 yield
             finally:
-                self._taken.pop(end, None)
-
-    def _make_room(self, client: str, size: int) -> None:
-        held = Counter({client: size})
-        for whose, own_size in self._taken.values():
-            held[whose] += own_size
-        left = dict(self._taken)
-        while left and held.total() > self._max_bytes:
-            most = max(held.values())
-            greediest = (end for end, (whose, _) in left.items() if held[whose] == most)
-            oldest = next(greediest, None)
-            if oldest is None:
-                raise BusyError("the answers that others take leave no room for this one")
-            whose, own_size = left.pop(oldest)
-            held[whose] -= own_size
-        for end in self._taken.keys() - left.keys():
-            _tell(end)
-        self._taken = left
+                self.all.leaving.pop(self, None)
 
 
 class _Places:

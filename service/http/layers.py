@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import TYPE_CHECKING
 
 from starlette.middleware.cors import CORSMiddleware
@@ -17,7 +18,7 @@ from .access.origins import Origins, hosts_of
 from .body_limits import BodyLimit, Pace
 from .watch.journal import Journal
 from .watch.metrics import Metrics
-from .watch.tracing import Traced
+from .watch.tracing import record
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
@@ -34,19 +35,19 @@ PROBES = frozenset({"/healthz", "/readyz"})
 
 
 def around(
-    app: ASGIApp,
+    routes: ASGIApp,
     settings: Settings,
     most: int,
     metrics: Metrics,
     keys: dict[str, Entry] | None,
     tracer: Tracer | None = None,
 ) -> ASGIApp:
-    """Lay around `app` everything that is done for every request.
+    """Lay around the routes everything that is done for every request.
 
     `most` requests may be under way. `keys` None: it is open to everybody; `tracer` None: nothing
     is traced.
     """
-    app = Head(app)
+    app: ASGIApp = Head(routes)
     app = BodyLimit(app, max_bytes=int(settings.body), pace=upload_pace(settings))
     if keys is not None:
         app = Bearer(app, keys)
@@ -59,8 +60,13 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = Journal(Crowd(app, most), metrics.request)
-    return app if tracer is None else Traced(app, tracer)
+    spans = [] if tracer is None else [partial(record, tracer)]
+    app = Journal(Crowd(app, most), metrics.request, *spans)
+
+    async def requests(scope: Scope, receive: Receive, send: Send) -> None:
+        await (app if scope["type"] == "http" else routes)(scope, receive, send)
+
+    return requests
 
 
 def upload_pace(settings: Settings) -> Pace:
@@ -87,7 +93,7 @@ class Crowd:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http" or scope["path"] in PROBES:
+        if scope["path"] in PROBES:
             await self.app(scope, receive, send)
             return
         if self._under_way >= self._most:
@@ -116,7 +122,7 @@ class Head:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http" or scope["method"] != "HEAD":
+        if scope["method"] != "HEAD":
             await self.app(scope, receive, send)
             return
         ended = False

@@ -22,6 +22,7 @@ from .. import log_lines
 from ..errors import NoModelError
 from ..settings import Settings, StartError
 from ..workers.jobs import hold_model
+from ..workers.worker import give_back
 from .access.origins import is_loopback
 from .admission import Admission
 from .app import create_app
@@ -37,6 +38,8 @@ LAST_SECONDS = 1.0
 WAITING, A_TURN = 2048, 32
 # The longest head: request line and headers together.
 HEAD_BYTES = 16 * 1024
+# Ticks, a tenth of a second each, between two times at which freed memory is given back.
+GIVE_BACK_TICKS = 100
 # Connections to the metrics.
 MOST_SCRAPERS = 16
 # Of uvicorn's settings, for the service and for its metrics.
@@ -181,7 +184,9 @@ class DrainingServer(PromptServer):
         self.handle_exit(sig, frame)
 
     async def on_tick(self, counter: int) -> bool:
-        """Decide, ten times a second, whether to exit."""
+        """Decide, ten times a second, whether to exit; every ten seconds give freed memory back."""
+        if counter % GIVE_BACK_TICKS == 0:
+            give_back()
         if self._signals:
             now = asyncio.get_running_loop().time()
             if self._began is None:

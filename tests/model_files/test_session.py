@@ -1,5 +1,6 @@
 """Answers of a model depend on a row alone; a network that breaks is an error of the model."""
 
+import os
 import pickle
 import subprocess
 import sys
@@ -168,3 +169,12 @@ def test_onnxruntime_is_imported_with_the_first_model():
         "f.load_model('paper'); assert 'onnxruntime' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_model_that_is_loaded_writes_nothing_of_its_user(tmp_path):
+    """From 1.29 on onnxruntime identifies the machine and reports its use unless told not to."""
+    home = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    environment = {name: value for name, value in os.environ.items() if "TELEMETRY" not in name}
+    command = [sys.executable, "-c", "import pns_common; pns_common.load_model()"]
+    subprocess.run(command, env=environment | home, check=True)
+    assert list(tmp_path.rglob("*")) == []

@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,28 +65,23 @@ def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
         process.wait(90)
 
 
-def held_by(pid: int) -> Held:
-    """Memory and descriptors of a process and those that it started."""
-    family = [pid, *_children(pid)]
-    return Held(
-        mebibytes=sum(map(_proportional, family)) / 1024,
-        descriptors=len(list(Path(f"/proc/{pid}/fd").iterdir())),
-        processes=len(family),
-    )
-
-
 def least_held_by(pid: int, seconds: float) -> Held:
-    """The least that is held meanwhile: what a job or a request takes, it gives back."""
-    pause, seen = threading.Event(), [held_by(pid)]
-    until = time.monotonic() + seconds
+    """The least that each process of a family holds meanwhile: what a job takes, it gives back.
+
+    Of each, whenever that is: with clients all the time they seldom rest at the same moment. One
+    that came meanwhile holds what it holds at the end.
+    """
+    pause, until = threading.Event(), time.monotonic() + seconds
+    first = least = _sizes(pid)
+    descriptors, processes = _descriptors(pid), len(first)
     while time.monotonic() < until:
         pause.wait(0.5)
-        seen.append(held_by(pid))
-    return Held(
-        min(held.mebibytes for held in seen),
-        min(held.descriptors for held in seen),
-        max(held.processes for held in seen),
-    )
+        sizes = _sizes(pid)
+        for one in first.keys() & least.keys() & sizes.keys():
+            sizes[one] = min(sizes[one], least[one])
+        least = sizes
+        descriptors, processes = min(descriptors, _descriptors(pid)), max(processes, len(sizes))
+    return Held(sum(least.values()) / 1024, descriptors, processes)
 
 
 def lines_of(log: Path) -> list[dict[str, object]]:
@@ -101,10 +96,16 @@ def _children(pid: int) -> Iterator[int]:
             yield from _children(child)
 
 
-def _proportional(pid: int) -> int:
-    """KiB of memory, shared pages by parts. A part of a library's file grows as others end."""
-    try:
-        return sum(map(int, PROPORTIONAL.findall(Path(f"/proc/{pid}/smaps_rollup").read_text())))
-    except OSError:
-        # It has ended meanwhile.
-        return 0
+def _sizes(pid: int) -> dict[int, int]:
+    """KiB by process: shared pages by parts. A part of a library's file grows as others end."""
+    sizes = {}
+    for one in (pid, *_children(pid)):
+        # It may end meanwhile.
+        with suppress(OSError):
+            text = Path(f"/proc/{one}/smaps_rollup").read_text()
+            sizes[one] = sum(map(int, PROPORTIONAL.findall(text)))
+    return sizes
+
+
+def _descriptors(pid: int) -> int:
+    return len(list(Path(f"/proc/{pid}/fd").iterdir()))

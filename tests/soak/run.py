@@ -47,7 +47,7 @@ def soak(
     """Run for about so many seconds: a tenth each in quiet before and after, the rest in attacks.
 
     Attackers have addresses of their own, or (`one_source`) none but the honest clients'. Memory is
-    compared between the two quiet times: the least that is held in each, between the honest
+    compared between the two quiet times: the least that each process holds, between the honest
     clients' jobs. A process grows until it has met all that there is, and what counts is what comes
     after: `warm_seconds` of every format and attack come before all that.
     """

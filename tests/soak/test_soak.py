@@ -1,8 +1,11 @@
 """A short soak, in CI: it asserts no time, only that no answer is wrong."""
 
+import os
+
 import pytest
 
-from tests.soak.process import lines_of, started
+from tests.soak import process
+from tests.soak.process import least_held_by, lines_of, started
 from tests.soak.run import soak
 
 # An attack goes on until it has struck, however few its own are.
@@ -35,3 +38,17 @@ def test_nothing_is_kept_open(soaked):
     before, after = soaked[0].before, soaked[0].after
     # Requests that are under way hold a few.
     assert after.descriptors <= before.descriptors + 40
+
+
+def test_memory_is_the_least_of_each_process_and_of_a_new_one_its_last(monkeypatch):
+    # Two hold more in turn, so that their sum never falls.
+    seen = iter([{1: 9, 2: 5}, {1: 4, 2: 9}, {1: 9, 2: 5, 3: 1}, {1: 8, 2: 6, 3: 2}])
+    last = {}
+
+    def sizes(pid):
+        last.update(next(seen, last))
+        return {one: 1024 * size for one, size in last.items()}
+
+    monkeypatch.setattr(process, "_sizes", sizes)
+    held = least_held_by(os.getpid(), 2.0)
+    assert (held.mebibytes, held.processes) == (4 + 5 + 2, 3)

@@ -214,6 +214,18 @@ def leave_freed() -> int:
     return pages(os.getpid())
 
 
+_KEPT: list[object] = []
+
+
+def leave_small_ones() -> int:
+    """Free most of many small objects, and keep some among them; return this process's pages."""
+    made = [{} for _ in range(500_000)]
+    _KEPT.extend(made[::1000])
+    held = pages(os.getpid())
+    del made
+    return held
+
+
 def pages(process: int) -> int:
     return int(Path(f"/proc/{process}/statm").read_text().split()[1])
 

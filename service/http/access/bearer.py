@@ -62,12 +62,11 @@ class Bearer:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] == "http":
-            try:
-                await self._admit(scope)
-            except ServiceError as error:
-                await problems.of_service_error(error)(scope, receive, send)
-                return
+        try:
+            await self._admit(scope)
+        except ServiceError as error:
+            await problems.of_service_error(error)(scope, receive, send)
+            return
         await self.app(scope, receive, send)
 
     async def _admit(self, scope: Scope) -> None:

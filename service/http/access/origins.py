@@ -71,13 +71,12 @@ class Origins:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] == "http":
-            sent = {name: value.decode("latin-1") for name, value in scope["headers"]}
-            try:
-                self._check(scope["method"], sent)
-            except ServiceError as error:
-                await problems.of_service_error(error)(scope, receive, send)
-                return
+        sent = {name: value.decode("latin-1") for name, value in scope["headers"]}
+        try:
+            self._check(scope["method"], sent)
+        except ServiceError as error:
+            await problems.of_service_error(error)(scope, receive, send)
+            return
         await self.app(scope, receive, send)
 
     def _check(self, method: str, sent: dict[bytes, str]) -> None:

@@ -31,6 +31,8 @@ class Entry:
         route: its pattern (`/jobs/{id}`), never what was in it; `none` where no route matched.
         code: the problem's code, or empty.
         received, sent: bytes of the bodies.
+        began: seconds of Unix time.
+        caller: the headers of the W3C that say whose trace it is part of.
     """
 
     id: str
@@ -42,25 +44,24 @@ class Entry:
     received: int
     sent: int
     seconds: float
+    began: float
+    caller: dict[str, str]
 
 
 class Journal:
-    """ASGI layer that names requests and writes down how each ended.
+    """ASGI layer that names requests and writes down how each ended, and tells others.
 
     Neither query strings nor paths are written: they may hold what a client would not like to see
     in a log (the id of a job, a file's name).
     """
 
-    def __init__(self, app: ASGIApp, count: Callable[[Entry], None]) -> None:
+    def __init__(self, app: ASGIApp, *others: Callable[[Entry], None]) -> None:
         self.app = app
-        self.count = count
+        self.others = others
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        began = time.perf_counter()
+        began, clock = time.time(), time.perf_counter()
         name = id_of(scope["headers"])
         token = REQUEST_ID.set(name)
         state = scope.setdefault("state", {})
@@ -100,17 +101,20 @@ class Journal:
                     client=_client(scope),
                     received=received,
                     sent=sent,
-                    seconds=time.perf_counter() - began,
+                    seconds=time.perf_counter() - clock,
+                    began=began,
+                    caller=_caller(scope),
                 )
             )
             REQUEST_ID.reset(token)
 
     def _write(self, entry: Entry) -> None:
         fields = asdict(entry)
-        name = fields.pop("id")
+        name, _, _ = (fields.pop(own) for own in ("id", "began", "caller"))
         fields["milliseconds"] = round(1000 * fields.pop("seconds"), 1)
         log.info("request", extra={"fields": fields, "request_id": name})
-        self.count(entry)
+        for tell in self.others:
+            tell(entry)
 
 
 def _route(scope: Scope) -> str:
@@ -127,3 +131,11 @@ def _client(scope: Scope) -> str:
     if isinstance(known, Client):
         return known.id
     return scope["client"][0] if scope.get("client") else ""
+
+
+def _caller(scope: Scope) -> dict[str, str]:
+    return {
+        name.decode(): value.decode("latin-1")
+        for name, value in scope["headers"]
+        if name in (b"traceparent", b"tracestate")
+    }

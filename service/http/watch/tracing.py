@@ -11,10 +11,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-from ...log_lines import HEADER
-from .journal import METHODS
+from .journal import METHODS, Entry
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
@@ -53,53 +50,25 @@ def tracer_from_environment() -> Tracer | None:
     return provider.get_tracer(NAME)
 
 
-class Traced:
-    """ASGI layer that makes a span of each request, under the caller's where it sends one."""
+def record(tracer: Tracer, entry: Entry) -> None:
+    """Make the span of a request that has ended, under the caller's where it sent one."""
+    from opentelemetry import propagate
+    from opentelemetry.trace import SpanKind, StatusCode
 
-    def __init__(self, app: ASGIApp, tracer: Tracer) -> None:
-        self.app = app
-        self.tracer = tracer
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        from opentelemetry import propagate
-        from opentelemetry.trace import SpanKind, StatusCode
-
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        carrier = {
-            name.decode("latin-1"): value.decode("latin-1")
-            for name, value in scope["headers"]
-            if name in (b"traceparent", b"tracestate")
-        }
-        # Anything may be sent as a method: of names without end others make series without end.
-        method = scope["method"] if scope["method"] in METHODS else OTHER
-        with self.tracer.start_as_current_span(
-            method,
-            context=propagate.extract(carrier),
-            kind=SpanKind.SERVER,
-            # Their texts are for the log.
-            record_exception=False,
-            set_status_on_exception=False,
-        ) as span:
-            status = 500
-
-            async def seen(message: Message) -> None:
-                nonlocal status
-                if message["type"] == "http.response.start":
-                    status = message["status"]
-                    ids = [value for name, value in message["headers"] if name == HEADER]
-                    span.set_attribute("pns.request_id", (ids or [b""])[0].decode("latin-1"))
-                await send(message)
-
-            try:
-                await self.app(scope, receive, seen)
-            finally:
-                route = getattr(scope.get("route"), "path", None) or "none"
-                span.update_name(f"{method} {route}")
-                span.set_attribute("http.request.method", method)
-                span.set_attribute("http.route", route)
-                span.set_attribute("http.response.status_code", status)
-                if status >= 500:
-                    span.set_status(StatusCode.ERROR)
+    # Anything may be sent as a method: of names without end others make series without end.
+    method = entry.method if entry.method in METHODS else OTHER
+    span = tracer.start_span(
+        f"{method} {entry.route}",
+        context=propagate.extract(entry.caller),
+        kind=SpanKind.SERVER,
+        start_time=int(1e9 * entry.began),
+        attributes={
+            "http.request.method": method,
+            "http.route": entry.route,
+            "http.response.status_code": entry.status,
+            "pns.request_id": entry.id,
+        },
+    )
+    if entry.status >= 500:
+        span.set_status(StatusCode.ERROR)
+    span.end()

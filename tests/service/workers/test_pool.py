@@ -143,8 +143,9 @@ def test_a_worker_that_dies_idle_is_replaced() -> None:
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+@pytest.mark.parametrize("job", [jobs.leave_freed, jobs.leave_small_ones])
 def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
-    monkeypatch: pytest.MonkeyPatch,
+    job: Callable[[], int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Kept for the next job, it would be counted against those of other workers."""
     monkeypatch.setattr(pools, "WATCH_SECONDS", 0.05)
@@ -152,7 +153,7 @@ def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
     async def scenario() -> None:
         async with workers() as pool:
             process = await pool.run(jobs.pid)
-            kept = await pool.run(jobs.leave_freed)
+            kept = await pool.run(job)
             await until(lambda: jobs.pages(process) < kept - 20 * 2**20 // PAGE)
             assert await pool.run(jobs.pid) == process
 
