@@ -63,12 +63,15 @@ def _machine() -> Finding:
 def _settings() -> str:
     from pydantic import ValidationError
 
+    from .http.access.keys import read_keys
     from .settings import PREFIX, Settings
 
     try:
-        Settings()
+        settings = Settings()
     except ValidationError as error:
         raise ValueError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
+    if settings.keys_file is not None:
+        read_keys(settings.keys_file)
     given = sorted(name for name in os.environ if name.upper().startswith(PREFIX))
     return ", ".join(given) if given else f"no {PREFIX}… variable is set"
 

@@ -116,6 +116,9 @@ def create_app(
         if warm_up is None:
             # Stand-ins load no model.
             beside.append(asyncio.create_task(_tell_when_ready(service)))
+        # A proxy sends requests to every replica whose port is open: they would wait for its model.
+        while shared is not None and not (desk.ready or admission.draining):
+            await asyncio.sleep(READY_SECONDS)
         try:
             yield
         finally:

@@ -39,7 +39,7 @@ def around(
     settings: Settings,
     most: int,
     metrics: Metrics,
-    keys: dict[str, Entry] | None,
+    keys: list[Entry] | None,
     tracer: Tracer | None = None,
 ) -> ASGIApp:
     """Lay around the routes everything that is done for every request.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import gc
 import logging
 import os
@@ -173,7 +174,7 @@ class DrainingServer(PromptServer):
             for headers in (self.server_state.default_headers, self.config.encoded_headers):
                 headers.append((b"connection", b"close"))
         self._signals += 1
-        if not self._shared or self._signals > 1:
+        if not (self._shared and self.started) or self._signals > 1:
             self._admission.draining = True
         # The third is for a shutdown that hangs.
         self.force_exit = self._signals > 2
@@ -220,7 +221,7 @@ class DrainingServer(PromptServer):
 def serve(settings: Settings) -> None:
     """Serve until a signal comes. Raises StartError."""
     # Uvicorn says between its log lines alone that a port is taken.
-    with _listening(settings.host, settings.port, "give another --host or --port"):
+    with _bound(settings.host, settings.port, "give another --host or --port"):
         check_model(settings)
         log_lines.configure()
         app = create_app(settings)
@@ -247,12 +248,17 @@ def check_model(settings: Settings) -> None:
             raise StartError(f"PNS_MODEL (or --model): {error.detail}") from error
 
 
-def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket:
-    """Listen at an address. Raises StartError where it is taken."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+def _bound(host: str, port: int, hint: str, what: str = "") -> socket.socket:
+    """Take an address, and do not listen there yet. Raises StartError where it is taken.
+
+    Who connected to a socket that listens would be cut off where it is closed.
+    """
+    bound = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        return socket.create_server((host, port), family=family)
+        bound.bind((host, port))
     except OSError as error:
+        bound.close()
         number = error.errno or 0
         if number < 0:
             # Of getaddrinfo: the host is no address.
@@ -260,6 +266,7 @@ def _listening(host: str, port: int, hint: str, what: str = "") -> socket.socket
         reason = os.strerror(number)
         where = "" if what else f" at {host}:{port}"
         raise StartError(f"{what}{reason}{where}; {hint}") from error
+    return bound
 
 
 def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
@@ -268,7 +275,10 @@ def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     if wanted is None:
         return None
     hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
-    listening = _listening(host, wanted, hint, f"metrics on {host}:{wanted}: ")
+    what = f"metrics on {host}:{wanted}: "
+    if wanted and wanted == settings.port:
+        raise StartError(f"{what}{os.strerror(errno.EADDRINUSE)}; {hint}")
+    listening = _bound(host, wanted, hint, what)
     log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
     config = uvicorn.Config(scrapes(metrics.registry), lifespan="off", proxy_headers=False, **ALIKE)
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])

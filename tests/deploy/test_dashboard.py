@@ -1,7 +1,9 @@
-"""The dashboard asks for series that the service has."""
+"""The dashboard and the alerts ask for series that the service has."""
 
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,9 +16,14 @@ from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 
-DASHBOARD = json.loads(
-    (Path(__file__).resolve().parents[2] / "deploy" / "grafana" / "pns.json").read_text()
-)
+yaml = pytest.importorskip("yaml")
+
+DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
+DASHBOARD = json.loads((DEPLOY / "grafana" / "pns.json").read_text())
+RULES = DEPLOY / "prometheus" / "pns.yaml"
+ALERTS = [
+    rule["expr"] for group in yaml.safe_load(RULES.read_text())["groups"] for rule in group["rules"]
+]
 QUERIES = [target["expr"] for panel in DASHBOARD["panels"] for target in panel["targets"]]
 SERIES = r"\b(?:pns|process)_[a-z_]+\b"
 
@@ -44,16 +51,27 @@ def served():
     return names
 
 
-@pytest.mark.parametrize("query", QUERIES)
-def test_every_series_of_the_dashboard_is_one_of_the_service(served, query):
+@pytest.mark.parametrize("query", QUERIES + ALERTS)
+def test_every_series_that_is_asked_for_is_one_of_the_service(served, query):
     named = re.findall(SERIES, query)
-    assert named
+    # Prometheus' own, of a scrape.
+    assert named or query.startswith("up{")
     for name in named:
         assert name in served, name
     for labels in re.findall(r"by \(([^)]*)\)", query):
         for label in labels.split(", "):
-            assert label in served[named[0]], label
+            assert label in served[named[0]] | {"instance"}, label
     assert query.count("(") == query.count(")")
+
+
+def test_prometheus_takes_the_alerts():
+    program = shutil.which("promtool")
+    if program is None:
+        pytest.skip("needs promtool (Debian: prometheus)")
+    done = subprocess.run(
+        [program, "check", "rules", RULES], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_panels_are_side_by_side():

@@ -294,8 +294,32 @@ def test_the_store_is_the_services_alone_and_throws_nothing_away():
     (store,) = of_kind("Deployment", "pns-store")["template"]["spec"]["containers"]
     arguments = " ".join(store["args"])
     assert "--maxmemory-policy noeviction" in arguments
-    assert "--maxmemory 1gb" in arguments
-    assert store["resources"]["limits"]["memory"] == "1536Mi"
+
+
+@pytest.mark.parametrize("where", ["compose", "kubernetes"])
+def test_the_store_has_room_for_what_all_replicas_put_there(where):
+    """docs/howto/replicas.md has the sum; a replica of another release may run beside them."""
+    image = dict(re.findall(r"^ +PNS_([A-Z_]+)=(\S+)", DOCKERFILE, re.MULTILINE))
+    if where == "compose":
+        services = yaml.safe_load((DEPLOY / "compose.replicas.yaml").read_text())["services"]
+        replicas, environment = 2, services["second"]["environment"]
+        command, limit = services["store"]["command"], mebibytes(services["store"]["mem_limit"])
+    else:
+        text = (DEPLOY / "kubernetes" / "replicas.yaml").read_text()
+        environment = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
+        environment |= dict(re.findall(r"(PNS_[A-Z_]+)=(\S+)", text))
+        most = of_kind("HorizontalPodAutoscaler", "pns")["maxReplicas"]
+        # What a rollout adds: a quarter.
+        replicas = most + -(-most // 4)
+        (store,) = of_kind("Deployment", "pns-store")["template"]["spec"]["containers"]
+        command = store["args"]
+        limit = mebibytes(store["resources"]["limits"]["memory"].lower().removesuffix("i"))
+    own = {name.removeprefix("PNS_"): value for name, value in environment.items()}
+    settings = Settings(**{name.lower(): value for name, value in (image | own).items()})
+    size = mebibytes(command[command.index("--maxmemory") + 1].removesuffix("b"))
+    held = (settings.result_bytes + replicas * settings.all_bodies) / 2**20
+    assert held + 64 <= size
+    assert size * 3 / 2 <= limit
 
 
 def test_both_replicas_of_compose_share_one_store_and_one_name():

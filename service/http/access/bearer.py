@@ -8,6 +8,7 @@ import logging
 import re
 import time
 from collections import Counter
+from collections.abc import Iterable
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -47,7 +48,7 @@ class TooManyWrongKeysError(BusyError):
 class Bearer:
     """ASGI layer that finds the client behind a key, and refuses those without one."""
 
-    def __init__(self, app: ASGIApp, keys: dict[str, Entry]) -> None:
+    def __init__(self, app: ASGIApp, keys: Iterable[Entry]) -> None:
         self.app = app
         self._keys = Keyring(keys)
         # Of keys that were right, by their plain hash: scrypt is run once for each.

@@ -8,6 +8,8 @@ import hmac
 import re
 import secrets
 import tomllib
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -64,25 +66,32 @@ class Keyring:
 
     Entries may be hashed more or less strongly than others. So that the time of a check tells
     neither which names there are nor how theirs are hashed, scrypt is run once with each choice of
-    parameters in the file: of the named entry, or of nobody.
+    parameters in the file as often as any name needs it: for the named entries, or for nobody.
     """
 
-    def __init__(self, entries: dict[str, Entry]) -> None:
-        self._entries = entries
-        self._nobody = {
-            _cost(entry.hash): _hash_of_nobody(entry.hash) for entry in entries.values()
-        }
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        self._entries: dict[str, list[Entry]] = {}
+        for entry in entries:
+            self._entries.setdefault(entry.name, []).append(entry)
+        # For each choice of parameters, the most hashes that any name has of it.
+        self._checks: Counter[tuple[int, int, int]] = Counter()
+        for own in self._entries.values():
+            self._checks |= Counter(_cost(entry.hash) for entry in own)
 
     def find(self, key: str, name: str) -> Entry | None:
-        """Return the entry of that name, where the key is its."""
-        entry = self._entries.get(name)
-        own = {} if entry is None else {_cost(entry.hash): entry.hash}
-        right = [matches(key, hashed) for hashed in (self._nobody | own).values()]
-        return entry if any(right) else None
+        """Return the entry of that name whose key it is."""
+        own = self._entries.get(name, [])
+        right = [entry for entry in own if matches(key, entry.hash)]
+        for cost in (self._checks - Counter(_cost(entry.hash) for entry in own)).elements():
+            matches(key, _hash_of_nobody(cost))
+        return right[0] if right else None
 
 
-def read_keys(path: Path) -> dict[str, Entry]:
-    """Read the entries of a file, by name. Raises KeysError."""
+def read_keys(path: Path) -> list[Entry]:
+    """Read the entries of a file. Raises KeysError.
+
+    Entries of one name are keys of one client: while a key is replaced there are two.
+    """
     said = f"PNS_KEYS_FILE: {path}"
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -99,9 +108,8 @@ def read_keys(path: Path) -> dict[str, Entry]:
         raise KeysError(f"{said}: entry {int(number) + 1}: {where}: {first['msg']}") from error
     if unknown := sorted(set(data) - {"key"}):
         raise KeysError(f"{said}: {unknown[0]} is not known; entries are [[key]] tables")
-    by_name = {entry.name: entry for entry in entries}
-    if len(by_name) < len(entries):
-        raise KeysError(f"{said}: two entries have one name")
+    if len({entry.hash for entry in entries}) < len(entries):
+        raise KeysError(f"{said}: two entries have one hash")
     if not entries:
         raise KeysError(f"{said}: there is no [[key]] in it, so nobody could ask for anything")
     for entry in entries:
@@ -109,7 +117,7 @@ def read_keys(path: Path) -> dict[str, Entry]:
             matches("", entry.hash)
         except (ValueError, MemoryError) as error:
             raise KeysError(f"{said}: {entry.name}: the hash asks for too much: {error}") from error
-    return by_name
+    return entries
 
 
 def toml_entry(entry: Entry) -> str:
@@ -129,9 +137,9 @@ def _cost(hashed: str) -> tuple[int, int, int]:
     return log_n, r, p
 
 
-def _hash_of_nobody(hashed: str) -> str:
-    """Make a hash that costs as much and is no key's."""
-    return _written(*_cost(hashed), secrets.token_bytes(16), secrets.token_bytes(32))
+def _hash_of_nobody(cost: tuple[int, int, int]) -> str:
+    """Make a hash of that cost, which is no key's."""
+    return _written(*cost, secrets.token_bytes(16), secrets.token_bytes(32))
 
 
 def _written(log_n: int, r: int, p: int, salt: bytes, digest: bytes) -> str:

@@ -124,7 +124,7 @@ def test_a_name_is_plain(name):
         ("[[keys]]\nname = 'a'", "keys is not known"),
         ("ENTRY\ncolour = 1", "colour"),
         ("not toml", "keys.toml"),
-        ("ENTRY\nENTRY", "two entries have one name"),
+        ("ENTRY\nENTRY", "two entries have one hash"),
         ("[[key]]\nname = 'a'\nhash = 'scrypt$24$8$1$SALT$DIGEST'", "asks for too much"),
         ("ENTRY\nfaces_per_minute = inf", "faces_per_minute"),
         ("ENTRY\nfaces_per_minute = 0", "faces_per_minute"),
@@ -149,6 +149,23 @@ def test_a_file_that_is_no_text_is_refused_at_start(tmp_path):
     path.write_bytes(b"# Schl\xfcssel\n")
     with pytest.raises(KeysError, match=r"keys\.toml: .*utf-8"):
         read_keys(path)
+
+
+def test_while_a_key_is_replaced_both_are_keys_of_one_client(tmp_path, caplog):
+    path = tmp_path / "keys.toml"
+    fresh, other = "pns_studio_" + "n" * 43, "pns_studio_" + "o" * 43
+    entries = [Entry(name="studio", hash=hash_of(key)) for key in (KEY, fresh)]
+    path.write_text("\n\n".join(map(written, entries)))
+    settings = Settings(workers=1, keys_file=path)
+    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    with local(app) as client:
+        handed_in = client.post("/jobs", content=b"echo", headers=GLB | bearer(KEY))
+        job = f"/jobs/{handed_in.json()['id']}"
+        assert client.get(job, headers=bearer(fresh)).status_code == 200
+        assert client.get(job, headers=bearer(other)).status_code == 401
+    # Without the old entry its key is no key.
+    assert Keyring(entries[1:]).find(KEY, "studio") is None
+    assert Keyring(entries[1:]).find(fresh, "studio") == entries[1]
 
 
 def test_what_costs_something_needs_a_key(client):
@@ -249,7 +266,7 @@ def wrong_key_from(layer, address, name="x"):
 
 
 def test_a_site_of_ipv6_guesses_no_more_than_its_subscribers_may():
-    layer = Bearer(PlainTextResponse("never"), {})
+    layer = Bearer(PlainTextResponse("never"), [])
     # Each from a /64 of its own, within one /56.
     said = [wrong_key_from(layer, f"2001:db8:0:{n:x}::1") for n in range(4 * WRONG_A_MINUTE + 1)]
     assert said == [401] * 4 * WRONG_A_MINUTE + [429]
@@ -257,7 +274,7 @@ def test_a_site_of_ipv6_guesses_no_more_than_its_subscribers_may():
 
 
 def test_places_for_checks_are_kept_for_addresses_that_sent_no_wrong_key(monkeypatch):
-    layer = Bearer(PlainTextResponse("never"), {})
+    layer = Bearer(PlainTextResponse("never"), [])
     guessers = [f"192.0.2.{number}" for number in range(MOST_WAITING)]
     for address in guessers:
         assert wrong_key_from(layer, address) == 401
@@ -289,7 +306,7 @@ def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeyp
         assert await refused(100) == 401
 
     monkeypatch.setattr(bearer_layer, "Keyring", Slow)
-    layer = Bearer(PlainTextResponse("never"), {})
+    layer = Bearer(PlainTextResponse("never"), [])
     asyncio.run(scenario())
 
 
@@ -303,7 +320,7 @@ def test_a_first_burst_with_one_key_waits_for_its_one_check(monkeypatch):
             return super().find(key, name)
 
     async def scenario():
-        layer = Bearer(PlainTextResponse("served"), {"studio": entry})
+        layer = Bearer(PlainTextResponse("served"), [entry])
         burst = [asyncio.create_task(status_of(layer, KEY, "192.0.2.1")) for _ in range(200)]
         await asyncio.sleep(0.05)
         # Who leaves ends the check for nobody else.

@@ -241,6 +241,27 @@ def test_no_job_is_lost_where_a_replica_is_killed(
         assert contents[0] == f"steps {tmp_path}".encode()
 
 
+def test_a_replica_takes_no_connection_before_it_is_ready(redis: str) -> None:
+    with served(workers=1, store=redis) as where, opened(where) as client:
+        assert client.get("/readyz").status_code == 200
+
+
+def test_a_replica_that_never_gets_ready_ends_when_it_is_told(redis: str, tmp_path: Path) -> None:
+    script = tmp_path / "replica.py"
+    script.write_text(REPLICA.replace("jobs.no_warm_up", "jobs.obey"))
+    port = free_port()
+    own = {"PNS_PORT": str(port), "PNS_WORKERS": "1", "PNS_STORE": redis, "PYTHONPATH": str(ROOT)}
+    with (tmp_path / "log").open("wb") as lines:
+        process = subprocess.Popen([sys.executable, script], stderr=lines, env=os.environ | own)
+    while b"this one is" not in (tmp_path / "log").read_bytes():
+        assert process.poll() is None
+        time.sleep(0.05)
+    with closing(socket.socket()) as probe:
+        assert probe.connect_ex(("127.0.0.1", port)) != 0
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(30) in (0, -signal.SIGTERM)
+
+
 def test_without_its_store_a_replica_says_so_and_takes_no_job() -> None:
     store = f"redis://127.0.0.1:{free_port()}/0"
     with served(workers=1, store=store) as where, opened(where) as client:
