@@ -92,7 +92,11 @@ Name = Annotated[str, BeforeValidator(_not_empty)]
 Place = Annotated[Path, BeforeValidator(_not_empty)]
 Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]
 Hosts = Annotated[
-    tuple[Annotated[str, BeforeValidator(_host)], ...], NoDecode, BeforeValidator(_listed)
+    tuple[Annotated[str, BeforeValidator(_host)], ...],
+    NoDecode,
+    BeforeValidator(_listed),
+    # As none it would mean any, which nobody who sets it wants.
+    BeforeValidator(_not_empty),
 ]
 Words = Annotated[tuple[Name, ...], Field(min_length=1), NoDecode, BeforeValidator(_listed)]
 Origins = Annotated[

@@ -156,6 +156,7 @@ def test_out_of_range_is_refused(name: str, value: object) -> None:
         ("cors_origins", "a.example", "'a.example' is no origin, such as https://a.example:8443"),
         ("memory", "4,5GiB", "'4,5GiB' is no size, such as 1.5GiB"),
         ("host", "", "it is empty: leave it out, or name something"),
+        ("hosts", "", "it is empty: leave it out, or name something"),
     ],
 )
 def test_what_is_refused_is_told_in_plain_words(name: str, value: str, says: str) -> None:

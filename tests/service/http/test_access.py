@@ -361,7 +361,7 @@ def test_a_check_costs_the_same_whoever_is_named_and_however_it_is_hashed(tmp_pa
     wrong = [f"pns_{name}_" + "w" * 43 for name in ("studio", "farm", "mill", "nobody")]
     for key, status in [*((key, 401) for key in wrong), (KEY, 200), (OTHER, 200)]:
         assert client.get("/healthz", headers=bearer(key)).status_code == status
-        assert costs == [(2**4, 8, 1), (2**6, 8, 1)]
+        assert sorted(costs) == [(2**4, 8, 1), (2**6, 8, 1)]
         costs.clear()
 
 

@@ -248,7 +248,7 @@ def test_a_replica_takes_no_connection_before_it_is_ready(redis: str) -> None:
 
 def test_a_replica_that_never_gets_ready_ends_when_it_is_told(redis: str, tmp_path: Path) -> None:
     script = tmp_path / "replica.py"
-    script.write_text(REPLICA.replace("jobs.no_warm_up", "jobs.obey"))
+    script.write_text(REPLICA.replace("no_warm_up", "fails_to_warm_up"))
     port = free_port()
     own = {"PNS_PORT": str(port), "PNS_WORKERS": "1", "PNS_STORE": redis, "PYTHONPATH": str(ROOT)}
     with (tmp_path / "log").open("wb") as lines:
