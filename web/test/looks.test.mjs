@@ -115,7 +115,7 @@ describe("pictures", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await page.selectOption("#look", heat);
       assert.ok(await page.isVisible("#legend"), heat);
       assert.equal(await page.getAttribute("#legend", "data-end"), "0");
-      assert.match(await page.textContent("#legend-note"), /nothing learned/);
+      assert.match(await page.textContent("#legend-note"), /^Nothing learned/);
       assert.ok(!(await picture(page)).data.equals(plain.data), `${heat} changes nothing`);
     }
   });

@@ -48,7 +48,7 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await page.selectOption("#model", { label: "linear" });
       await page.locator("#label-right", { hasText: "linear" }).waitFor();
       await settled(page);
-      assert.match(await page.textContent("#promises"), /This is linear’s rule alone\. .* than 0\u00a0% of its size/);
+      assert.match(await page.textContent("#promises"), /This is linear’s rule alone\. .* than 0\.01\u00a0% of its size/);
       await page.selectOption("#look", "distance");
       await page.waitForFunction(() => Number(document.querySelector("#legend").dataset.max) > 0);
       assert.match(page.url(), /model=scheme%3Alinear/);

@@ -42,7 +42,7 @@ export function promises(report: Report, lengths: Lengths): Promised[] {
 }
 
 function movedBy({ moved, size }: Lengths): string {
-  return moved === null ? "" : `No point is farther from your model than ${percent(moved / size)} of its size.`;
+  return moved === null ? "" : `No point is farther from your model than ${percent(Math.max(moved / size, 1e-4))} of its size.`;
 }
 
 function classic(lengths: Lengths): Promised {

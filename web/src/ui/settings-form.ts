@@ -113,11 +113,6 @@ export class SettingsForm {
       }),
     );
     select("levels").value = String(settings.levels);
-    const closed = this.levels().find((level) => this.refusal(level));
-    const isHeavy = this.rigged && settings.levels > 1 && this.predicted(settings.levels) > HEAVY;
-    element("levels-note").textContent = closed && this.wanted.levels >= closed
-      ? `${closed} and more: ${this.refusal(closed)} of this service`
-      : isHeavy ? `Many faces for a game: 1 gives ${count(this.predicted(1))}.` : "";
     const bundled = this.models.map((model) =>
       option(model.default ? "" : model.name, ruleName(model)),
     );
@@ -174,6 +169,11 @@ export class SettingsForm {
   /** Show what follows from the other settings. */
   private adjust(): void {
     const { settings, model } = this;
+    const closed = this.levels().find((level) => this.refusal(level));
+    const isHeavy = this.rigged && settings.levels > 1 && this.predicted(settings.levels) > HEAVY;
+    element("levels-note").textContent = closed && this.wanted.levels >= closed
+      ? `${closed} and more: ${this.refusal(closed)} of this service`
+      : isHeavy ? `Many faces for a game: 1 gives ${count(this.predicted(1))}.` : "";
     const share = settings.budget === null || !model ? 1 : settings.budget / model.budget;
     const percent = Math.round(100 * share);
     input("strength").value = String(percent);
