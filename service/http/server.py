@@ -262,7 +262,7 @@ def _bound(host: str, port: int, hint: str, what: str = "") -> socket.socket:
         number = error.errno or 0
         if number < 0:
             # Of getaddrinfo: the host is no address.
-            raise StartError(f"{what}{error.strerror}; {hint}") from error
+            raise StartError(f"{what}{error.strerror}: {host!r}; {hint}") from error
         reason = os.strerror(number)
         where = "" if what else f" at {host}:{port}"
         raise StartError(f"{what}{reason}{where}; {hint}") from error
@@ -279,6 +279,7 @@ def metrics_server(metrics: Metrics, settings: Settings) -> PromptServer | None:
     if wanted and wanted == settings.port:
         raise StartError(f"{what}{os.strerror(errno.EADDRINUSE)}; {hint}")
     listening = _bound(host, wanted, hint, what)
+    listening.listen()
     log.info("metrics on http://%s:%d/metrics", host, listening.getsockname()[1])
     config = uvicorn.Config(scrapes(metrics.registry), lifespan="off", proxy_headers=False, **ALIKE)
     return PromptServer(config, settings.head_seconds, MOST_SCRAPERS, [listening])

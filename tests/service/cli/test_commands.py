@@ -250,7 +250,7 @@ def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
     assert code == 0
     file = tmp_path / "keys.toml"
     file.write_text(entry)
-    (kept,) = keys.read_keys(file).values()
+    (kept,) = keys.read_keys(file)
     assert (kept.name, kept.faces_per_minute) == ("studio", budget)
     assert keys.matches(fresh.strip(), kept.hash)
     assert fresh.strip() not in entry
