@@ -84,7 +84,7 @@ function folding(report: Report, { rule }: Lengths): Promised {
     title: "Adds no folds",
     text: turned
       ? `${counted(turned, "face")} turned over: look at the wireframe there.`
-      : "The learned rule turns no face over.",
+      : "What PNS adds turns no face over.",
     mathematics:
       `${turned ? counted(turned, "face") : "No face"} at any level points away from its counterpart by ${rule}’s rule ` +
       `with the same creases.${kept}`,

@@ -41,7 +41,7 @@ export function showPromises(report: Report, lengths: Lengths): string {
 
 /** What a hint asks for, as the service spells it: the button's words, and the settings. */
 const DEEDS: [RegExp, string, (value: string) => Partial<Settings>][] = [
-  [/use crease=angle:(\d+), which keeps ([\d,]+), for a rounder shape/, "Make it rounder: keep $2", (angle) => ({ crease: "angle", angle: Number(angle) })],
+  [/use crease=angle:(\d+), which keeps ([\d,]+), for a rounder shape/, "Make it rounder: keep $2 sharp edges", (angle) => ({ crease: "angle", angle: Number(angle) })],
   [/use crease=off to round all of them/, "Round all edges", () => ({ crease: "off" })],
   [/use normals=smooth/, "Smooth shading", () => ({ normals: "smooth" })],
   [/use weld_tolerance=[\d.]+( to join vertices that nearly coincide)?/, "Close small gaps", () => ({ weld: true })],
