@@ -7,11 +7,12 @@ import errno
 import gc
 import logging
 import os
+import select
 import signal
 import socket
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from types import FrameType
 from typing import Any
@@ -110,10 +111,22 @@ class PromptServer(uvicorn.Server):
         too_many = len(connections) - self._most
         oldest = sorted(self._idle, key=lambda connection: self._idle[connection][0])
         for number, connection in enumerate(oldest):
-            waited = now - self._idle[connection][0]
-            # One that has just come may have sent its head.
-            if waited >= self._head_seconds or (number < too_many and waited > 0):
+            since, last, _ = self._idle[connection]
+            waited = now - since
+            # One that has just come may have sent its head. One that rests between requests, as a
+            # proxy keeps them, may have sent the next: it would be lost with it.
+            crowded = number < too_many and waited > 0
+            if waited >= self._head_seconds or (crowded and not (last and _unread(connection))):
                 connection.transport.abort()
+
+
+def _unread(connection: Any) -> bool:
+    """Return whether the system holds bytes of this connection that were not read yet."""
+    with suppress(OSError):
+        polled = select.poll()
+        polled.register(connection.transport.get_extra_info("socket").fileno(), select.POLLIN)
+        return bool(polled.poll(0))
+    return False
 
 
 class DrainingServer(PromptServer):

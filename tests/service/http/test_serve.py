@@ -16,11 +16,14 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import IO, NamedTuple
 
 import httpx2
 import pytest
+import uvicorn
 
+from service.http.server import PromptServer
 from service.meshfiles.example import part_glb
 from tests.support.added_scheme import TRIANGLE, halved, with_linear
 from tests.support.packages import served_file
@@ -302,6 +305,38 @@ def test_a_job_that_ended_just_before_a_signal_waits_to_be_fetched_too(
             time.sleep(0.02)
         assert server.get(f"{job}/result")[0] == 200
         assert server.process.wait(HANGS) == 0
+
+
+class Resting:
+    """A connection that has had its answer, as uvicorn keeps it, and its transport."""
+
+    def __init__(self, ours: socket.socket) -> None:
+        self.transport, self.cycle, self.ours = self, SimpleNamespace(response_complete=True), ours
+        self.aborted = False
+
+    def is_closing(self) -> bool:
+        return False
+
+    def get_write_buffer_size(self) -> int:
+        return 0
+
+    def get_extra_info(self, name: str) -> socket.socket:
+        return self.ours
+
+    def abort(self) -> None:
+        self.aborted = True
+
+
+def test_in_a_crowd_no_request_that_waits_unread_is_lost_with_its_connection() -> None:
+    server = PromptServer(uvicorn.Config("unused:app"), head_seconds=10, most=0)
+    (ours, theirs), (other, silent) = socket.socketpair(), socket.socketpair()
+    with ours, theirs, other, silent:
+        asked, resting = Resting(ours), Resting(other)
+        server.server_state.connections = {asked, resting}  # type: ignore[assignment]
+        server._end_idle(0.0)
+        theirs.sendall(b"POST")
+        server._end_idle(1.0)
+        assert (asked.aborted, resting.aborted) == (False, True)
 
 
 def test_an_idle_server_stops_at_once() -> None:
