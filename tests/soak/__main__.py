@@ -18,7 +18,7 @@ from typing import Annotated
 
 import typer
 
-from tests.soak.process import lines_of, started
+from tests.soak.process import faults_in, lines_of, started
 from tests.soak.run import Soaked, soak
 
 MOST_WARM_SECONDS = 300.0
@@ -46,6 +46,8 @@ def main(
         lines = lines_of(log)
         longest = max(len(str(line)) for line in lines)
         typer.echo(f"{len(lines)} log lines, all JSON, the longest of {longest} characters")
+        for line in faults_in(log):
+            typer.echo(line, err=True)
     print_(soaked)
 
 

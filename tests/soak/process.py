@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -40,7 +39,8 @@ class Held:
 def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
     """A server behind the proxy of deploy/, or alone where there is no nginx.
 
-    Yields the address that clients ask, and the server's process id; its lines go to `log`.
+    Yields the address that clients ask, and the server's process id; its lines go to `log`, the
+    proxy's to access.log beside it.
     """
     command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
     with log.open("w") as lines:
@@ -53,10 +53,7 @@ def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
             pause.wait(0.1)
         address = told[1], int(told[2])
         if shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin"):
-            with (
-                tempfile.TemporaryDirectory() as folder,
-                proxied(address, Path(folder), seconds=10, rate=HONEST_RATE) as front,
-            ):
+            with proxied(address, log.parent, seconds=10, rate=HONEST_RATE) as front:
                 yield front, process.pid
         else:
             yield address, process.pid
@@ -87,6 +84,19 @@ def least_held_by(pid: int, seconds: float) -> Held:
 def lines_of(log: Path) -> list[dict[str, object]]:
     """The service's log; every line must be JSON."""
     return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def faults_in(log: Path) -> list[dict[str, object]]:
+    """What the proxy and the service say of each request that failed for no fault of its own."""
+    access = log.parent / "access.log"
+    proxy = lines_of(access) if access.exists() else []
+    service = lines_of(log)
+    faults = {
+        line.get("request_id")
+        for line in (*proxy, *service)
+        if line.get("status") in (500, 502, 504)
+    }
+    return [line for line in (*proxy, *service) if line.get("request_id") in faults]
 
 
 def _children(pid: int) -> Iterator[int]:
