@@ -30,7 +30,8 @@ class Admission:
     """
 
     def __init__(self, *, uploads: int, body_bytes: int, answer_bytes: int) -> None:
-        self.draining = False
+        # Whether answers end their connections, and whether nothing new is taken.
+        self.leaving = self.draining = False
         self._uploads = _Places("uploads", uploads)
         self._jobs = _Places("jobs", None)
         self._answers = _Shares(answer_bytes)

@@ -147,7 +147,7 @@ def create_app(
     # Whoever names a route puts this before it; requests come without it.
     app.root_path = settings.prefix
     app.layers = lambda routes: layers.around(
-        routes, settings, most + BEYOND, metrics, keys, tracer
+        routes, settings, most + BEYOND, admission, metrics, keys, tracer
     )
     app.state.most = most
     app.state.admission = admission

@@ -15,6 +15,7 @@ from . import problems
 from .access.bearer import Bearer
 from .access.keys import Entry
 from .access.origins import Origins, hosts_of
+from .admission import Admission
 from .body_limits import BodyLimit, Pace
 from .watch.journal import Journal
 from .watch.metrics import Metrics
@@ -38,6 +39,7 @@ def around(
     routes: ASGIApp,
     settings: Settings,
     most: int,
+    admission: Admission,
     metrics: Metrics,
     keys: list[Entry] | None,
     tracer: Tracer | None = None,
@@ -61,7 +63,7 @@ def around(
             expose_headers=EXPOSED,
         )
     spans = [] if tracer is None else [partial(record, tracer)]
-    app = Journal(Crowd(app, most), metrics.request, *spans)
+    app = Journal(Crowd(app, most), lambda: admission.leaving, metrics.request, *spans)
 
     async def requests(scope: Scope, receive: Receive, send: Send) -> None:
         await (app if scope["type"] == "http" else routes)(scope, receive, send)
@@ -97,9 +99,8 @@ class Crowd:
             await self.app(scope, receive, send)
             return
         if self._under_way >= self._most:
-            answer = problems.of_service_error(BusyError("too many requests are under way"))
-            answer.headers["Connection"] = "close"
-            await answer(scope, receive, send)
+            error = BusyError("too many requests are under way")
+            await problems.of_service_error(error)(scope, receive, send)
             return
         self._under_way += 1
         try:

@@ -181,11 +181,8 @@ class DrainingServer(PromptServer):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Close the admission; uvicorn calls this as the signal handler."""
-        if not self._signals:
-            # The next request on a connection would meet its end. The list is that of answers under
-            # way, too; the other is what it is made anew of.
-            for headers in (self.server_state.default_headers, self.config.encoded_headers):
-                headers.append((b"connection", b"close"))
+        # The next request on a connection would meet its end.
+        self._admission.leaving = True
         self._signals += 1
         if not (self._shared and self.started) or self._signals > 1:
             self._admission.draining = True

@@ -10,6 +10,7 @@ from contextlib import ExitStack, closing, suppress
 
 import pytest
 
+from service.http.room import BEYOND
 from tests.support.live import served
 from tests.support.proxy import free_port, proxied
 
@@ -201,6 +202,15 @@ def test_a_subscribers_ipv6_addresses_are_one(proxy):
     assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
     answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:0:2::1"})
     assert answer.status == 200
+
+
+def test_who_is_refused_while_sending_is_told_why(tmp_path, monkeypatch):
+    """A service that ended the connection would reset it, and the proxy's answer be a 502."""
+    monkeypatch.setattr("service.http.app.connections_that_fit", lambda settings: -BEYOND)
+    with served(workers=1, proxies="127.0.0.1") as behind, proxied(behind, tmp_path) as address:
+        refused = [ask(address, "POST", "/subdivide", bytes(4_000_000), GLB) for _ in range(20)]
+    for answer, text in refused:
+        assert (answer.status, json.loads(text)["code"]) == (503, "busy")
 
 
 def test_without_a_service_the_proxy_says_so(tmp_path):

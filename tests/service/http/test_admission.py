@@ -12,6 +12,7 @@ from starlette.types import Message, Receive, Scope, Send
 from service.errors import BusyError
 from service.http.admission import Admission, CutOffError, DrainingError
 from service.http.layers import Crowd
+from service.http.watch.journal import Journal
 
 
 def run(scenario: Callable[[], Awaitable[None]]) -> None:
@@ -251,5 +252,39 @@ def test_a_probe_passes_a_crowd_and_what_is_too_much_is_refused() -> None:
     asyncio.run(scenario())
     assert [path for path in begun if path != "/healthz"] == [f"/{n}" for n in range(100)]
     assert sent[0]["status"] == 503
-    assert dict(sent[0]["headers"])[b"connection"] == b"close"
     assert b"retry-after" in dict(sent[0]["headers"])
+
+
+@pytest.mark.parametrize(
+    ("headers", "arrives", "ends"),
+    [
+        pytest.param([], [], True, id="no body"),
+        pytest.param([(b"content-length", b"0")], [], True, id="an empty body"),
+        pytest.param([(b"content-length", b"9")], [], False, id="a body that is not read"),
+        pytest.param([(b"transfer-encoding", b"chunked")], [True], False, id="half a body"),
+        pytest.param([(b"content-length", b"9")], [True, False], True, id="a whole body"),
+    ],
+)
+def test_a_service_that_leaves_ends_no_connection_on_a_body_that_is_still_sent(
+    headers: list[tuple[bytes, bytes]], arrives: list[bool], ends: bool
+) -> None:
+    """What is sent after that would meet a reset, and the answer be lost with it."""
+    sent: list[dict[str, Any]] = []
+    pieces = iter([{"type": "http.request", "body": b"x", "more_body": more} for more in arrives])
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        for _ in arrives:
+            await receive()
+        await send({"type": "http.response.start", "status": 503, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def receive() -> Message:
+        return next(pieces)
+
+    async def send(message: Message) -> None:
+        sent.append(dict(message))
+
+    journal = Journal(app, lambda: True)
+    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers}
+    asyncio.run(journal(scope, receive, send))
+    assert ((b"connection", b"close") in sent[0]["headers"]) == ends

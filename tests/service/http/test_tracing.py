@@ -27,7 +27,8 @@ def traced():
     settings = Settings(workers=1)
     app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
     tracer = provider.get_tracer("tests")
-    app.layers = lambda routes: layers.around(routes, settings, 1, Metrics(), None, tracer)
+    around = (settings, 1, app.state.admission, Metrics(), None, tracer)
+    app.layers = lambda routes: layers.around(routes, *around)
     with local(app, raise_server_exceptions=False) as client:
         yield client, exporter.get_finished_spans
 
