@@ -1,4 +1,4 @@
-"""The outermost layer: a body over its limit is refused before anything parses or keeps it."""
+"""A body over its limit is refused before anything parses or keeps it."""
 
 from __future__ import annotations
 

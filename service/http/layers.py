@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,7 @@ TAKEN = (
 # What it may read of an answer beside its body.
 EXPOSED = ("ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID")
 
+CLOSE = (b"connection", b"close")
 PROBES = frozenset({"/healthz", "/readyz"})
 
 
@@ -63,7 +65,8 @@ def around(
             expose_headers=EXPOSED,
         )
     spans = [] if tracer is None else [partial(record, tracer)]
-    app = Journal(Crowd(app, most), lambda: admission.leaving, metrics.request, *spans)
+    app = Journal(Crowd(app, most), metrics.request, *spans)
+    app = Endings(app, lambda: admission.leaving)
 
     async def requests(scope: Scope, receive: Receive, send: Send) -> None:
         await (app if scope["type"] == "http" else routes)(scope, receive, send)
@@ -79,6 +82,53 @@ def upload_pace(settings: Settings) -> Pace:
         idle=settings.idle_seconds,
         whole=settings.upload_seconds,
     )
+
+
+class Endings:
+    """ASGI layer that ends no connection on a client that still sends its body.
+
+    What it sends after that would be met by a reset, and the answer lost: a proxy makes a 502 of
+    it. So once `leaving` says so, an answer is the last on its connection where the body is whole;
+    and where the client wants the connection closed, the answer ends when the body does, or when
+    the server ends the connection.
+    """
+
+    def __init__(self, app: ASGIApp, leaving: Callable[[], bool]) -> None:
+        self.app = app
+        self._leaving = leaving
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        sends, held = _has_body(scope), False
+
+        async def noted() -> Message:
+            nonlocal sends
+            message = await receive()
+            sends = sends and message.get("more_body", False)
+            return message
+
+        async def ending(message: Message) -> None:
+            nonlocal held
+            if message["type"] == "http.response.start":
+                if self._leaving() and not sends:
+                    message = {**message, "headers": [*message.get("headers", []), CLOSE]}
+            elif sends and CLOSE in scope["headers"] and not message.get("more_body"):
+                held = True
+                message = {**message, "more_body": True}
+            await send(message)
+
+        await self.app(scope, noted, ending)
+        if held:
+            scope["state"]["answered"] = True
+            while sends:
+                await noted()
+            await send({"type": "http.response.body", "body": b""})
+
+
+def _has_body(scope: Scope) -> bool:
+    headers = dict(scope["headers"])
+    length = headers.get(b"content-length", b"0")
+    return b"transfer-encoding" in headers or length.strip(b"0") != b""
 
 
 class Crowd:

@@ -62,9 +62,9 @@ class PromptServer(uvicorn.Server):
     """A server whose idle connections end in time.
 
     A connection is idle while it has no request under way: nothing was sent, or half a head, or it
-    rests after an answer. It ends `head_seconds` later; where there are more than `most`
-    connections, those that are idle for longest end at once. One whose client still takes its
-    answer is idle once it takes none of it any more.
+    rests after an answer, or sends what nobody reads of a body. It ends `head_seconds` later; where
+    there are more than `most` connections, those that are idle for longest end at once. One whose
+    client still takes its answer is idle once it takes none of it any more.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class PromptServer(uvicorn.Server):
             # Of the one protocol that is served here.
             cycle: Any = getattr(connection, "cycle", None)
             closing = connection.transport.is_closing()
-            if closing or cycle is None or cycle.response_complete:
+            if closing or cycle is None or cycle.response_complete or _answered(cycle):
                 untaken = connection.transport.get_write_buffer_size()
                 since, last, left = before.get(connection, (now, cycle, untaken))
                 rests = last is cycle and left == untaken
@@ -118,6 +118,11 @@ class PromptServer(uvicorn.Server):
             crowded = number < too_many and waited > 0
             if waited >= self._head_seconds or (crowded and not (last and _unread(connection))):
                 connection.transport.abort()
+
+
+def _answered(cycle: Any) -> bool:
+    """Return whether the whole answer was sent, and its end only waits for the request's."""
+    return cycle.scope["state"].get("answered", False)
 
 
 def _unread(connection: Any) -> bool:

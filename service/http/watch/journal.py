@@ -1,4 +1,4 @@
-"""The journal: for each request an id, one line and its counts; the outermost layer."""
+"""The journal: for each request an id, one line and its counts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ log = logging.getLogger("pns.request")
 
 # Anything may be sent as a method; what is none of these is counted as one.
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-CLOSE = (b"connection", b"close")
 # Answers hold what strangers have sent: browsers are not to guess what it is.
 NO_SNIFFING = (b"x-content-type-options", b"nosniff")
 # Where a client is gone before it has its answer, as proxies log it.
@@ -52,18 +51,12 @@ class Entry:
 class Journal:
     """ASGI layer that names requests and writes down how each ended, and tells others.
 
-    Once `leaving` says so, an answer is the last on its connection; not while its request's body is
-    still being sent: a connection that closes then takes the answer with it.
-
     Neither query strings nor paths are written: they may hold what a client would not like to see
     in a log (the id of a job, a file's name).
     """
 
-    def __init__(
-        self, app: ASGIApp, leaving: Callable[[], bool], *others: Callable[[Entry], None]
-    ) -> None:
+    def __init__(self, app: ASGIApp, *others: Callable[[Entry], None]) -> None:
         self.app = app
-        self.leaving = leaving
         self.others = others
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -74,13 +67,11 @@ class Journal:
         state = scope.setdefault("state", {})
         state["request_id"] = name
         status, received, sent, whole = 0, 0, 0, False
-        sends_more = _has_body(scope)
 
         async def counted_receive() -> Message:
-            nonlocal received, sends_more
+            nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            sends_more = sends_more and message.get("more_body", False)
             return message
 
         async def counted_send(message: Message) -> None:
@@ -88,8 +79,6 @@ class Journal:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 headers = [*message.get("headers", []), (HEADER, name.encode()), NO_SNIFFING]
-                if self.leaving() and not sends_more:
-                    headers.append(CLOSE)
                 message = {**message, "headers": headers}
             else:
                 sent += len(message.get("body", b""))
@@ -135,14 +124,6 @@ def _route(scope: Scope) -> str:
         routes = getattr(scope["app"].state, "routes", ())
         route = next((one for one in routes if one.matches(scope)[0] is not Match.NONE), None)
     return getattr(route, "path", None) or "none"
-
-
-def _has_body(scope: Scope) -> bool:
-    lengths = (b"0", b"")
-    return any(
-        name == b"transfer-encoding" or (name == b"content-length" and value not in lengths)
-        for name, value in scope["headers"]
-    )
 
 
 def _client(scope: Scope) -> str:

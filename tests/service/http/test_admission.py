@@ -11,8 +11,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from service.errors import BusyError
 from service.http.admission import Admission, CutOffError, DrainingError
-from service.http.layers import Crowd
-from service.http.watch.journal import Journal
+from service.http.layers import Crowd, Endings
 
 
 def run(scenario: Callable[[], Awaitable[None]]) -> None:
@@ -284,7 +283,6 @@ def test_a_service_that_leaves_ends_no_connection_on_a_body_that_is_still_sent(
     async def send(message: Message) -> None:
         sent.append(dict(message))
 
-    journal = Journal(app, lambda: True)
-    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers}
-    asyncio.run(journal(scope, receive, send))
+    scope = {"type": "http", "headers": headers}
+    asyncio.run(Endings(app, lambda: True)(scope, receive, send))
     assert ((b"connection", b"close") in sent[0]["headers"]) == ends

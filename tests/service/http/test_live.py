@@ -7,6 +7,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import httpx2
@@ -223,3 +224,27 @@ def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(
             assert len(connection.recv(answered)) == answered
     assert subdivide(client, b"here").content == b"here"
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_who_is_refused_while_sending_and_wants_the_connection_closed_reads_why(
+    client: httpx2.Client,
+) -> None:
+    """Closed at once, it would be reset, and the answer lost."""
+    answer = client.post(
+        "/subdivide?levels=9", content=bytes(8 * MIB), headers=GLB | {"Connection": "close"}
+    )
+    assert (answer.status_code, answer.json()["parameter"]) == (422, "levels")
+
+
+def test_who_is_refused_and_stops_sending_is_let_go() -> None:
+    with (
+        served(workers=1, head_seconds=1) as where,
+        socket.create_connection(where, timeout=600) as connection,
+    ):
+        connection.sendall(
+            request_head(10**6, extra="Connection: close\r\n").replace(b"gltf", b"x")
+        )
+        assert connection.recv(2**16).startswith(b"HTTP/1.1 415 ")
+        with suppress(ConnectionResetError):
+            while connection.recv(2**16):
+                pass
