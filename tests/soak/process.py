@@ -87,7 +87,7 @@ def lines_of(log: Path) -> list[dict[str, object]]:
 
 
 def faults_in(log: Path) -> list[dict[str, object]]:
-    """What the proxy and the service say of each request that failed for no fault of its own."""
+    """Lines of the proxy and the service about requests that failed for no fault of their own."""
     access = log.parent / "access.log"
     proxy = lines_of(access) if access.exists() else []
     service = lines_of(log)

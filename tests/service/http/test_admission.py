@@ -267,7 +267,7 @@ def test_a_probe_passes_a_crowd_and_what_is_too_much_is_refused() -> None:
 def test_a_service_that_leaves_ends_no_connection_on_a_body_that_is_still_sent(
     headers: list[tuple[bytes, bytes]], arrives: list[bool], ends: bool
 ) -> None:
-    """What is sent after that would meet a reset, and the answer be lost with it."""
+    """The rest of it would meet a reset, and the answer be lost with it."""
     sent: list[dict[str, Any]] = []
     pieces = iter([{"type": "http.request", "body": b"x", "more_body": more} for more in arrives])
 
