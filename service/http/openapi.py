@@ -17,8 +17,8 @@ from . import documentation
 # What every route may answer, whatever it is asked; the rest is with the routes.
 EVERYWHERE = {
     "401": "A key is needed, or the one sent is not known",
-    "429": "Too much was asked for, or too many wrong keys (see Retry-After)",
-    "503": "Too many connections, or too many keys to check at once (see Retry-After)",
+    "429": "Too much was asked for (see Retry-After)",
+    "503": "Too many connections (see Retry-After)",
 }
 # And where it is asked for work.
 ASKED_FOR_WORK = {"403": "A page of another origin asks, and is not named"}

@@ -1,21 +1,15 @@
 """Clients by their addresses behind proxies, and by their keys."""
 
-import asyncio
-import base64
-import hashlib
 import http.client
 import logging
 import re
-import threading
 from contextlib import closing
 
 import httpx2
 import pytest
 from starlette.responses import PlainTextResponse
 
-from service.http.access import bearer as bearer_layer
-from service.http.access.bearer import KEPT_FREE, MOST_WAITING, WRONG_A_MINUTE, Bearer
-from service.http.access.keys import Entry, Keyring, KeysError, hash_of, matches, new_key, read_keys
+from service.http.access.keys import Entry, KeysError, hash_of, new_key, read_keys
 from service.http.access.keys import toml_entry as written
 from service.http.access.origins import Origins
 from service.http.app import create_app
@@ -87,25 +81,13 @@ def bearer(key):
     return {"Authorization": f"Bearer {key}"}
 
 
-def test_a_key_is_kept_as_a_salted_hash():
-    key = new_key("studio")
-    assert len(key) == len("pns_studio_") + 43
-    first, second = hash_of(key), hash_of(key)
+def test_of_a_key_of_256_random_bits_a_hash_is_kept():
+    first, second = new_key("studio"), new_key("studio")
     assert first != second
-    assert matches(key, first)
-    assert matches(key, second)
-    assert not matches(key + "x", first)
-    assert not matches(key, first[:-1] + ("A" if first[-1] != "A" else "Q"))
-    assert not matches(key, "scrypt$nonsense")
-
-
-def test_the_hash_is_scrypts():
-    """RFC 7914, the third test vector, cut to our length: another implementation agrees."""
-    digest = hashlib.scrypt(
-        b"pleaseletmein", salt=b"SodiumChloride", n=16384, r=8, p=1, maxmem=2**26, dklen=64
-    )
-    assert digest.hex().startswith("7023bdcb3afd7348461c06cd81fd38eb")
-    assert hash_of("pleaseletmein", salt=b"SodiumChlorideXX").split("$")[1:4] == ["14", "8", "1"]
+    assert len(first) == len("pns_studio_") + 43
+    # As `printf %s KEY | sha256sum` writes it: FIPS 180's first example.
+    of_abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert hash_of("abc") == f"sha256:{of_abc}"
 
 
 @pytest.mark.parametrize("name", ["", "-a", "A", "a_b", "a" * 64, "a b", 'a"'])
@@ -125,16 +107,14 @@ def test_a_name_is_plain(name):
         ("ENTRY\ncolour = 1", "colour"),
         ("not toml", "keys.toml"),
         ("ENTRY\nENTRY", "two entries have one hash"),
-        ("[[key]]\nname = 'a'\nhash = 'scrypt$24$8$1$SALT$DIGEST'", "asks for too much"),
         ("ENTRY\nfaces_per_minute = inf", "faces_per_minute"),
         ("ENTRY\nfaces_per_minute = 0", "faces_per_minute"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused_at_start(tmp_path, text, reason):
     entry = written(Entry(name="a", hash=hash_of("x")))
-    text = text.replace("ENTRY", entry).replace("SALT", "s" * 22).replace("DIGEST", "d" * 43)
     path = tmp_path / "keys.toml"
-    path.write_text(text)
+    path.write_text(text.replace("ENTRY", entry))
     with pytest.raises(KeysError, match=reason):
         create_app(Settings(workers=1, keys_file=path))
 
@@ -164,8 +144,10 @@ def test_while_a_key_is_replaced_both_are_keys_of_one_client(tmp_path, caplog):
         assert client.get(job, headers=bearer(fresh)).status_code == 200
         assert client.get(job, headers=bearer(other)).status_code == 401
     # Without the old entry its key is no key.
-    assert Keyring(entries[1:]).find(KEY, "studio") is None
-    assert Keyring(entries[1:]).find(fresh, "studio") == entries[1]
+    path.write_text(written(entries[1]))
+    with local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)) as client:
+        statuses = [client.get("/limits", headers=bearer(key)).status_code for key in (KEY, fresh)]
+    assert statuses == [401, 200]
 
 
 def test_what_costs_something_needs_a_key(client):
@@ -230,139 +212,17 @@ def test_a_wrong_key_is_refused_wherever_it_is_sent(keys_file, authorization):
     assert KEY not in client.get("/healthz", headers=headers).text
 
 
-def test_guessing_ends_for_the_name_that_is_guessed_and_locks_out_no_other(keys_file):
+def test_however_many_wrong_keys_come_a_right_one_is_served(keys_file):
+    """From the same address and of the same name, and by one that was not seen before."""
     settings = Settings(workers=1, keys_file=keys_file)
     client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
-    assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
     wrong = [
         client.get("/healthz", headers=bearer(f"pns_studio_{n:043d}")).status_code
-        for n in range(WRONG_A_MINUTE + 2)
+        for n in range(1000)
     ]
-    assert wrong == [401] * WRONG_A_MINUTE + [429] * 2
-    refused = client.get("/healthz", headers=bearer(f"pns_studio_{99:043d}"))
-    assert (refused.status_code, refused.json()["code"]) == (429, "too-many-wrong-keys")
-    assert int(refused.headers["retry-after"]) >= 1
-    # One that was right stays right, and another that was not seen yet is checked.
-    assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
-    assert client.get("/healthz", headers=bearer(OTHER)).status_code == 200
-
-
-async def status_of(layer, key, address):
-    """Return the status that a key gets."""
-    said = []
-
-    async def send(message):
-        said.append(message.get("status"))
-
-    headers = [(b"authorization", f"Bearer {key}".encode())]
-    scope = {"type": "http", "headers": headers, "path": "/jobs", "client": (address, 1)}
-    await layer(scope, None, send)
-    return said[0]
-
-
-def wrong_key_from(layer, address, name="x"):
-    """Return the status that a wrong key gets."""
-    return asyncio.run(status_of(layer, f"pns_{name}_{'w' * 43}", address))
-
-
-def test_a_site_of_ipv6_guesses_no_more_than_its_subscribers_may():
-    layer = Bearer(PlainTextResponse("never"), [])
-    # Each from a /64 of its own, within one /56.
-    said = [wrong_key_from(layer, f"2001:db8:0:{n:x}::1") for n in range(4 * WRONG_A_MINUTE + 1)]
-    assert said == [401] * 4 * WRONG_A_MINUTE + [429]
-    assert wrong_key_from(layer, "2001:db8:1::1") == 401
-
-
-def test_places_for_checks_are_kept_for_addresses_that_sent_no_wrong_key(monkeypatch):
-    layer = Bearer(PlainTextResponse("never"), [])
-    guessers = [f"192.0.2.{number}" for number in range(MOST_WAITING)]
-    for address in guessers:
-        assert wrong_key_from(layer, address) == 401
-    layer._waiting.update(guessers[: MOST_WAITING - KEPT_FREE])
-    assert wrong_key_from(layer, guessers[-1]) == 503
-    assert wrong_key_from(layer, "198.51.100.1") == 401
-
-
-def test_few_keys_wait_for_their_check_and_the_next_is_told_to_come_back(monkeypatch):
-    let_go = threading.Event()
-
-    class Slow(Keyring):
-        def find(self, key, name):
-            assert let_go.wait(600)
-            return super().find(key, name)
-
-    def refused(number):
-        return status_of(layer, f"pns_x_{number:043d}", f"192.0.2.{number}")
-
-    async def scenario():
-        waiting = [asyncio.create_task(refused(number)) for number in range(MOST_WAITING + 1)]
-        for _ in range(3):  # nothing is awaited on the way to a refusal
-            await asyncio.sleep(0)
-        ended = [task.done() for task in waiting]
-        let_go.set()
-        assert ended == [False] * MOST_WAITING + [True]
-        assert await asyncio.gather(*waiting) == [401] * MOST_WAITING + [503]
-        # Those that waited are gone: there is room again.
-        assert await refused(100) == 401
-
-    monkeypatch.setattr(bearer_layer, "Keyring", Slow)
-    layer = Bearer(PlainTextResponse("never"), [])
-    asyncio.run(scenario())
-
-
-def test_a_first_burst_with_one_key_waits_for_its_one_check(monkeypatch):
-    checks, let_go = [], threading.Event()
-
-    class Slow(Keyring):
-        def find(self, key, name):
-            checks.append(name)
-            assert let_go.wait(600)
-            return super().find(key, name)
-
-    async def scenario():
-        layer = Bearer(PlainTextResponse("served"), [entry])
-        burst = [asyncio.create_task(status_of(layer, KEY, "192.0.2.1")) for _ in range(200)]
-        await asyncio.sleep(0.05)
-        # Who leaves ends the check for nobody else.
-        burst.pop(0).cancel()
-        let_go.set()
-        assert await asyncio.gather(*burst) == [200] * 199
-        assert await status_of(layer, KEY, "192.0.2.1") == 200
-
-    entry = Entry(name="studio", hash=hashed_by(KEY, 4))
-    monkeypatch.setattr(bearer_layer, "Keyring", Slow)
-    asyncio.run(scenario())
-    assert checks == ["studio"]
-
-
-def hashed_by(key, log_n):
-    digest = hashlib.scrypt(key.encode(), salt=b"s" * 16, n=2**log_n, r=8, p=1, dklen=32)
-    texts = (base64.urlsafe_b64encode(data).decode().rstrip("=") for data in (b"s" * 16, digest))
-    return f"scrypt${log_n}$8$1$" + "$".join(texts)
-
-
-def test_a_check_costs_the_same_whoever_is_named_and_however_it_is_hashed(tmp_path, monkeypatch):
-    entries = [
-        Entry(name="studio", hash=hashed_by(KEY, 4)),
-        Entry(name="farm", hash=hashed_by(OTHER, 6)),
-        Entry(name="mill", hash=hashed_by("another", 6)),
-    ]
-    path = tmp_path / "keys.toml"
-    path.write_text("\n\n".join(map(written, entries)))
-    settings = Settings(workers=1, keys_file=path)
-    client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
-    scrypt, costs = hashlib.scrypt, []
-
-    def counted(*arguments, n, r, p, **others):
-        costs.append((n, r, p))
-        return scrypt(*arguments, n=n, r=r, p=p, **others)
-
-    monkeypatch.setattr(hashlib, "scrypt", counted)
-    wrong = [f"pns_{name}_" + "w" * 43 for name in ("studio", "farm", "mill", "nobody")]
-    for key, status in [*((key, 401) for key in wrong), (KEY, 200), (OTHER, 200)]:
-        assert client.get("/healthz", headers=bearer(key)).status_code == status
-        assert sorted(costs) == [(2**4, 8, 1), (2**6, 8, 1)]
-        costs.clear()
+    assert wrong == [401] * 1000
+    for key in (KEY, OTHER):
+        assert client.get("/healthz", headers=bearer(key)).status_code == 200
 
 
 def test_the_routes_see_the_name_of_the_key(client, caplog):
