@@ -22,8 +22,9 @@ from .worker import no_interrupt
 
 T = TypeVar("T")
 
-# Where a fresh process cannot even warm up, the next one is not started at once.
-RESTART_SECONDS = 1.0
+# Where a fresh process cannot even warm up, the next one is not started at once: it waits as long at
+# first, and twice as long after each that fails, up to the most.
+RESTART_SECONDS, MOST_SECONDS = 1.0, 30.0
 # A warm-up imports and loads, and where kernels are not kept compiles them: minutes on a busy
 # machine. What was compiled is lost with a worker that is killed, and the next begins anew.
 WARM_UP_SECONDS = 600.0
@@ -224,13 +225,14 @@ class Workers:
         try:
             future = _scheduled(pool, self._warm_up)
             await _result(pool, future, time.monotonic() + WARM_UP_SECONDS)
-        except (JobTimeout, WorkerDied) as error:
+        except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
+            # What a disk had no room for, say, it may have soon.
             log.warning("a worker did not start: %s", _reason(error))
-            await asyncio.sleep(RESTART_SECONDS)
+            await asyncio.sleep(min(RESTART_SECONDS * 2 ** self.restarts["start"], MOST_SECONDS))
             self._replace(pool, "start")
             return
         except Exception as error:
-            # The process lives: it may still serve what does not need the thing that failed.
+            # It serves what does not need the thing that failed: a model, say.
             log.warning("a worker did not warm up: %s", error)
         else:
             self._warm.add(pool)

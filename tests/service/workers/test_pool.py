@@ -384,6 +384,21 @@ def test_a_worker_whose_warm_up_kills_it_is_tried_again_without_haste() -> None:
     run(scenario)
 
 
+def test_a_worker_whose_warm_up_fails_is_tried_again(tmp_path: Path) -> None:
+    """A full disk, say, or no memory for a moment: nobody else would start the service anew."""
+    kernels = tmp_path / "kernels"
+
+    async def scenario() -> None:
+        async with workers(warm_up=partial(os.stat, kernels)) as pool:
+            while not pool.restarts["start"]:
+                await asyncio.sleep(0.05)
+            kernels.touch()
+            while not pool.ready:
+                await asyncio.sleep(0.05)
+
+    run(scenario)
+
+
 @pytest.mark.parametrize("what", ["channels", "launch_process"])
 def test_a_process_that_the_system_refuses_is_told_and_tried_again(
     what: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
