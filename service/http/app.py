@@ -158,6 +158,8 @@ def create_app(
     service = Service(settings, desk, admission, models, book)
     if settings.store is not None:
         service.shared = SharedJobs(service, JobStore(settings))
+    text = "Whether the store of jobs answers; 1 without one"
+    metrics.gauge("pns_store_up", text, lambda: service.shared is None or service.shared.reached)
     text = "Results that are kept here, none with a store"
     metrics.gauge("pns_result_bytes", text, lambda: book.bytes)
     routers = [routes.router(service), job_routes.router(service), pages.router(settings.prefix)]

@@ -22,8 +22,8 @@ from .worker import no_interrupt
 
 T = TypeVar("T")
 
-# Where a fresh process cannot even warm up, the next one is not started at once: it waits as long at
-# first, and twice as long after each that fails, up to the most.
+# Where a fresh process cannot even warm up, the next one is not started at once, but after a pause,
+# which doubles from the first to the longest.
 RESTART_SECONDS, MOST_SECONDS = 1.0, 30.0
 # A warm-up imports and loads, and where kernels are not kept compiles them: minutes on a busy
 # machine. What was compiled is lost with a worker that is killed, and the next begins anew.

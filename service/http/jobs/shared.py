@@ -46,6 +46,8 @@ class SharedJobs:
 
     def __init__(self, service: Service, store: JobStore) -> None:
         self.store = store
+        self.reached = True
+        """Whether the store answered when it was last looked at."""
         self._service = service
         settings = service.settings
         self._room = Room(int(settings.result_bytes), settings.results)
@@ -161,7 +163,9 @@ class SharedJobs:
             try:
                 while not self._service.admission.draining and await self._adopt():
                     pass
+                self.reached = True
             except StoreError as error:
+                self.reached = False
                 log.warning("jobs of other replicas are not looked at: %s", error)
             except BusyError:
                 # There is no room yet.

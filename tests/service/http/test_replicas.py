@@ -18,15 +18,18 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import AsyncMock
 
 import httpx2
 import pytest
 
+from service.http.app import create_app
 from service.http.jobs.shared import SharedJobs
 from service.http.jobs.store import ANSWER, BODY, JobStore, Lease, RedisFiles
 from service.settings import Settings
 from service.workers.memory_file import MemoryFile
-from tests.support.live import served
+from tests.support import stand_in_jobs as jobs
+from tests.support.live import local, served
 from tests.support.proxy import free_port, proxied
 
 GLB = {"Content-Type": "model/gltf-binary"}
@@ -339,6 +342,19 @@ def test_a_job_that_cannot_be_taken_over_keeps_no_other_from_it(
     monkeypatch.setattr(shared, "_adopt", adopt)
     with pytest.raises(SystemExit):
         asyncio.run(shared.adopt_for_ever())
+
+
+def test_the_metrics_say_whether_the_store_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.http.jobs.shared.LEASE_SECONDS", 0.04)
+    settings = Settings(workers=1, store=f"redis://127.0.0.1:{free_port()}/0")
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
+    registry = app.state.metrics.registry
+    with local(app):
+        while registry.get_sample_value("pns_store_up"):
+            time.sleep(0.01)
+        monkeypatch.setattr(JobStore, "take_orphan", AsyncMock(return_value=None))
+        while not registry.get_sample_value("pns_store_up"):
+            time.sleep(0.01)
 
 
 def test_a_lease_keeps_a_job_from_other_replicas(redis: str) -> None:
