@@ -100,6 +100,7 @@ class Endings:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
         sends, held = _has_body(scope), False
+        closes = _wants_to_close(scope)
 
         async def noted() -> Message:
             nonlocal sends
@@ -112,7 +113,7 @@ class Endings:
             if message["type"] == "http.response.start":
                 if self._leaving() and not sends:
                     message = {**message, "headers": [*message.get("headers", []), CLOSE]}
-            elif sends and CLOSE in scope["headers"] and not message.get("more_body"):
+            elif sends and closes and not message.get("more_body"):
                 held = True
                 message = {**message, "more_body": True}
             await send(message)
@@ -129,6 +130,11 @@ def _has_body(scope: Scope) -> bool:
     headers = dict(scope["headers"])
     length = headers.get(b"content-length", b"0")
     return b"transfer-encoding" in headers or length.strip(b"0") != b""
+
+
+def _wants_to_close(scope: Scope) -> bool:
+    said = (value.lower() for name, value in scope["headers"] if name == b"connection")
+    return scope["http_version"] == "1.0" or any(b"close" in value for value in said)
 
 
 class Crowd:

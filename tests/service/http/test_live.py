@@ -226,14 +226,15 @@ def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
+@pytest.mark.parametrize("first_line", ["HTTP/1.1\r\nConnection: Close", "HTTP/1.0"])
 def test_who_is_refused_while_sending_and_wants_the_connection_closed_reads_why(
-    client: httpx2.Client,
+    address: tuple[str, int], first_line: str
 ) -> None:
     """Closed at once, it would be reset, and the answer lost."""
-    answer = client.post(
-        "/subdivide?levels=9", content=bytes(8 * MIB), headers=GLB | {"Connection": "close"}
-    )
-    assert (answer.status_code, answer.json()["parameter"]) == (422, "levels")
+    head = request_head(8 * MIB).replace(b"HTTP/1.1", first_line.encode(), 1)
+    with socket.create_connection(address, timeout=600) as connection:
+        connection.sendall(head.replace(b"gltf", b"x") + bytes(8 * MIB))
+        assert received(connection).startswith(b"HTTP/1.1 415 ")
 
 
 def test_who_is_refused_and_stops_sending_is_let_go() -> None:
