@@ -30,8 +30,10 @@ class Admission:
     """
 
     def __init__(self, *, uploads: int, body_bytes: int, answer_bytes: int) -> None:
-        # Whether answers end their connections, and whether nothing new is taken.
-        self.leaving = self.draining = False
+        # The service is to shut down, or has too many connections: then answers end theirs.
+        self.leaving = self.crowded = False
+        # Nothing new is taken.
+        self.draining = False
         self._uploads = _Places("uploads", uploads)
         self._jobs = _Places("jobs", None)
         self._answers = _Shares(answer_bytes)

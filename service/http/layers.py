@@ -66,7 +66,7 @@ def around(
         )
     spans = [] if tracer is None else [partial(record, tracer)]
     app = Journal(Crowd(app, most), metrics.request, *spans)
-    app = Endings(app, lambda: admission.leaving)
+    app = Endings(app, lambda: admission.leaving or admission.crowded)
 
     async def requests(scope: Scope, receive: Receive, send: Send) -> None:
         await (app if scope["type"] == "http" else routes)(scope, receive, send)
@@ -88,14 +88,14 @@ class Endings:
     """ASGI layer that ends no connection on a client that still sends its body.
 
     What it sends after that would be met by a reset, and the answer lost: a proxy makes a 502 of
-    it. So once `leaving` says so, an answer is the last on its connection where the body is whole;
+    it. So once `last` says so, an answer is the last on its connection where the body is whole;
     and where the client wants the connection closed, the answer ends when the body does, or when
     the server ends the connection.
     """
 
-    def __init__(self, app: ASGIApp, leaving: Callable[[], bool]) -> None:
+    def __init__(self, app: ASGIApp, last: Callable[[], bool]) -> None:
         self.app = app
-        self._leaving = leaving
+        self._last = last
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -111,7 +111,7 @@ class Endings:
         async def ending(message: Message) -> None:
             nonlocal held
             if message["type"] == "http.response.start":
-                if self._leaving() and not sends:
+                if self._last() and not sends:
                     message = {**message, "headers": [*message.get("headers", []), CLOSE]}
             elif sends and closes and not message.get("more_body"):
                 held = True

@@ -7,12 +7,11 @@ import errno
 import gc
 import logging
 import os
-import select
 import signal
 import socket
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from multiprocessing import get_context
 from types import FrameType
 from typing import Any
@@ -63,8 +62,9 @@ class PromptServer(uvicorn.Server):
 
     A connection is idle while it has no request under way: nothing was sent, or half a head, or it
     rests after an answer, or sends what nobody reads of a body. It ends `head_seconds` later; where
-    there are more than `most` connections, those that are idle for longest end at once. One whose
-    client still takes its answer is idle once it takes none of it any more.
+    there are more than `most` connections, those that are idle for longest end at once, but for
+    those that rest between two requests: these end soon, as in a crowd an answer is the last on its
+    connection. One whose client still takes its answer is idle once it takes none of it any more.
     """
 
     def __init__(
@@ -109,15 +109,14 @@ class PromptServer(uvicorn.Server):
                 rests = last is cycle and left == untaken
                 self._idle[connection] = (since if rests else now, cycle, untaken)
         too_many = len(connections) - self._most
-        oldest = sorted(self._idle, key=lambda connection: self._idle[connection][0])
-        for number, connection in enumerate(oldest):
-            since, last, _ = self._idle[connection]
-            waited = now - since
-            # One that has just come may have sent its head. One that rests between requests, as a
-            # proxy keeps them, may have sent the next: it would be lost with it.
-            crowded = number < too_many and waited > 0
-            if waited >= self._head_seconds or (crowded and not (last and _unread(connection))):
+        for connection in sorted(self._idle, key=lambda connection: self._idle[connection][0]):
+            waited = now - self._idle[connection][0]
+            # One that has just come may have sent its head. One that rests, as a proxy keeps them,
+            # may be sent a request at this moment, which would be lost with it.
+            crowded = too_many > 0 and waited > 0 and not _rests(connection)
+            if waited >= self._head_seconds or crowded:
                 connection.transport.abort()
+                too_many -= 1
 
 
 def _answered(cycle: Any) -> bool:
@@ -125,13 +124,12 @@ def _answered(cycle: Any) -> bool:
     return cycle.scope["state"].get("answered", False)
 
 
-def _unread(connection: Any) -> bool:
-    """Return whether the system holds bytes of this connection that were not read yet."""
-    with suppress(OSError):
-        polled = select.poll()
-        polled.register(connection.transport.get_extra_info("socket").fileno(), select.POLLIN)
-        return bool(polled.poll(0))
-    return False
+def _rests(connection: Any) -> bool:
+    """Return whether a request and its answer are over, and nothing of the next has come."""
+    cycle = connection.cycle
+    over = cycle is not None and cycle.response_complete and not cycle.more_body
+    untaken = connection.transport.get_write_buffer_size()
+    return over and not untaken and not connection.conn.trailing_data[0]
 
 
 class DrainingServer(PromptServer):
@@ -201,6 +199,7 @@ class DrainingServer(PromptServer):
 
     async def on_tick(self, counter: int) -> bool:
         """Decide, ten times a second, whether to exit; every ten seconds give freed memory back."""
+        self._admission.crowded = len(self.server_state.connections) > self._most
         if counter % GIVE_BACK_TICKS == 0:
             give_back()
         if self._signals:
