@@ -50,7 +50,7 @@ def stay_away(seconds: float, model: object) -> None:
 
 
 def fails_to_warm_up(model: object) -> None:
-    raise RuntimeError("no such thing")
+    raise NoModelError("no such thing")
 
 
 def measure(work: Work) -> Cost:

@@ -252,7 +252,7 @@ def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
     file.write_text(entry)
     (kept,) = keys.read_keys(file)
     assert (kept.name, kept.faces_per_minute) == ("studio", budget)
-    assert keys.matches(fresh.strip(), kept.hash)
+    assert kept.hash == keys.hash_of(fresh.strip())
     assert fresh.strip() not in entry
 
 
