@@ -218,9 +218,9 @@ def test_however_many_wrong_keys_come_a_right_one_is_served(keys_file):
     client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
     wrong = [
         client.get("/healthz", headers=bearer(f"pns_studio_{n:043d}")).status_code
-        for n in range(1000)
+        for n in range(200)
     ]
-    assert wrong == [401] * 1000
+    assert wrong == [401] * 200
     for key in (KEY, OTHER):
         assert client.get("/healthz", headers=bearer(key)).status_code == 200
 
