@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -25,7 +26,7 @@ class BodyLimit:
     A Content-Length over the limit is answered at once with 413. A body without one is counted: the
     read that passes the limit raises LimitError inside the application; a read for which the client
     took longer than its pace allows raises UploadTimeoutError. Only waiting for the client is
-    counted, not what is done in between.
+    counted, not what is done in between, and nothing once the answer has begun.
     """
 
     def __init__(self, app: ASGIApp, *, max_bytes: int, pace: Pace) -> None:
@@ -40,7 +41,14 @@ class BodyLimit:
         except ServiceError as error:
             await problems.of_service_error(error)(scope, receive, send)
             return
-        await self.app(scope, self._counted(receive), send)
+        begun = False
+
+        async def noted(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        await self.app(scope, self._counted(receive, lambda: begun), noted)
 
     def _check_announced(self, scope: Scope) -> None:
         for name, value in scope["headers"]:
@@ -52,7 +60,7 @@ class BodyLimit:
     def _check(self, size: int) -> None:
         check_limit("body", size, self.max_bytes, f"the body has {size} bytes or more")
 
-    def _counted(self, receive: Receive) -> Receive:
+    def _counted(self, receive: Receive, begun: Callable[[], bool]) -> Receive:
         size = 0
         waited = 0.0
         complete = False
@@ -60,14 +68,16 @@ class BodyLimit:
 
         async def counted() -> Message:
             nonlocal size, waited, complete
-            if complete:
-                # Only a disconnect can follow, and that may be waited for without a limit.
+            if complete or begun():
+                # Only a disconnect is waited for, and that may take as long as it likes.
                 return await receive()
             began = clock()
             try:
                 async with asyncio.timeout(self.pace.patience(size, waited)):
                     message = await receive()
             except TimeoutError as error:
+                if begun():
+                    return await receive()
                 excuse = self.pace.excuse(size, waited + clock() - began)
                 raise UploadTimeoutError(f"the body: {excuse}") from error
             waited += clock() - began

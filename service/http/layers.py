@@ -100,7 +100,8 @@ class Endings:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
         sends, held = _has_body(scope), False
-        closes = _wants_to_close(scope)
+        # The end of an answer to HEAD is what ends its route.
+        closes = scope["method"] != "HEAD" and _wants_to_close(scope)
 
         async def noted() -> Message:
             nonlocal sends

@@ -219,6 +219,17 @@ class DrainingServer(PromptServer):
                     self.should_exit = True
         return await super().on_tick(counter)
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let what is in the buffers out; who has the answer and still sends ends meanwhile."""
+        asyncio.get_running_loop().call_later(FLUSH_SECONDS / 2, self._end_answered)
+        await super().shutdown(sockets)
+
+    def _end_answered(self) -> None:
+        for connection in tuple(self.server_state.connections):
+            cycle: Any = getattr(connection, "cycle", None)
+            if cycle is not None and _answered(cycle):
+                connection.transport.abort()
+
     def _begin_to_drain(self) -> None:
         log.info("draining: %d requests and jobs are under way", self._admission.admitted)
         if not self._shared:

@@ -173,11 +173,17 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
+    from pns_common import ModelError
+
     from ..meshfiles import convert  # noqa: F401
     from ..warming import warm_up as compile_kernels
 
-    compile_kernels(log.info)
-    hold_model(model, providers)
+    _MODELS.hold(model, providers)
+    try:
+        compile_kernels(log.info)
+    except ModelError as error:
+        raise NoModelError(str(error)) from error
+    _MODELS.get()
 
 
 def hold_model(model: Model | str | None, providers: Sequence[str] | None = None) -> None:

@@ -22,9 +22,8 @@ from .worker import no_interrupt
 
 T = TypeVar("T")
 
-# Where a fresh process cannot even warm up, the next one is not started at once, but after a pause,
-# which doubles from the first to the longest.
-RESTART_SECONDS, MOST_SECONDS = 1.0, 30.0
+# Where a fresh process cannot even warm up, the next one is not started at once.
+RESTART_SECONDS = 5.0
 # A warm-up imports and loads, and where kernels are not kept compiles them: minutes on a busy
 # machine. What was compiled is lost with a worker that is killed, and the next begins anew.
 WARM_UP_SECONDS = 600.0
@@ -228,11 +227,11 @@ class Workers:
         except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
             # What a disk had no room for, say, it may have soon.
             log.warning("a worker did not start: %s", _reason(error))
-            await asyncio.sleep(min(RESTART_SECONDS * 2 ** self.restarts["start"], MOST_SECONDS))
+            await asyncio.sleep(RESTART_SECONDS)
             self._replace(pool, "start")
             return
         except Exception as error:
-            # It serves what does not need the thing that failed: a model, say.
+            # A model does not load, say: the process serves what needs none.
             log.warning("a worker did not warm up: %s", error)
         else:
             self._warm.add(pool)

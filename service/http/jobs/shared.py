@@ -160,12 +160,11 @@ class SharedJobs:
         """Take the jobs of replicas that have died, one after the other."""
         while True:
             await asyncio.sleep(LEASE_SECONDS / 4)
+            self.reached = await self.store.answers()
             try:
                 while not self._service.admission.draining and await self._adopt():
                     pass
-                self.reached = True
             except StoreError as error:
-                self.reached = False
                 log.warning("jobs of other replicas are not looked at: %s", error)
             except BusyError:
                 # There is no room yet.

@@ -226,6 +226,13 @@ class JobStore:
         """Close the connections."""
         await self._redis.aclose()
 
+    async def answers(self) -> bool:
+        """Return whether the store is there."""
+        try:
+            return bool(await self._redis.ping())
+        except self._errors:
+            return False
+
     async def create(
         self,
         job_id: str,

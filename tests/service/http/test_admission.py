@@ -283,6 +283,6 @@ def test_a_service_that_leaves_ends_no_connection_on_a_body_that_is_still_sent(
     async def send(message: Message) -> None:
         sent.append(dict(message))
 
-    scope = {"type": "http", "http_version": "1.1", "headers": headers}
+    scope = {"type": "http", "http_version": "1.1", "method": "POST", "headers": headers}
     asyncio.run(Endings(app, lambda: True)(scope, receive, send))
     assert ((b"connection", b"close") in sent[0]["headers"]) == ends

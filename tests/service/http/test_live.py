@@ -7,7 +7,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx2
@@ -249,3 +249,37 @@ def test_who_is_refused_and_stops_sending_is_let_go() -> None:
         with suppress(ConnectionResetError):
             while connection.recv(2**16):
                 pass
+
+
+def test_a_body_that_never_comes_ends_an_answer_without_a_word_in_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Nobody reads that of a stream of events, and a client may not even have begun it."""
+    with (
+        served(workers=1, idle_seconds=1, head_seconds=1) as where,
+        httpx2.Client(base_url=f"http://{where[0]}:{where[1]}", timeout=600) as client,
+    ):
+        job = client.post("/jobs", content=b"sleep 5", headers=GLB).json()["id"]
+        for method in ("GET", "HEAD"):
+            head = f"{method} /jobs/{job}/events HTTP/1.1\r\nHost: localhost\r\n"
+            with socket.create_connection(where, timeout=600) as connection:
+                connection.sendall(f"{head}Connection: close\r\nContent-Length: 9\r\n\r\n".encode())
+                with suppress(ConnectionResetError):
+                    while connection.recv(2**16):
+                        pass
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_a_client_that_sends_what_nobody_reads_does_not_hold_a_shutdown_up(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with ExitStack() as held:
+        with served(workers=1) as where:
+            connection = held.enter_context(socket.create_connection(where, timeout=600))
+            head = request_head(10**6, extra="Connection: close\r\n")
+            connection.sendall(head.replace(b"gltf", b"x"))
+            assert connection.recv(2**16).startswith(b"HTTP/1.1 415 ")
+        with suppress(ConnectionResetError):
+            while connection.recv(2**16):
+                pass
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
