@@ -18,6 +18,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import IO, NamedTuple
+from unittest.mock import Mock
 
 import httpx2
 import pytest
@@ -309,37 +310,22 @@ def test_a_job_that_ended_just_before_a_signal_waits_to_be_fetched_too(
         assert server.process.wait(HANGS) == 0
 
 
-class Connected:
-    """A connection as uvicorn keeps it, and its transport; with or without a request before."""
-
-    def __init__(self, *, asked: bool = True, more_body: bool = False, began: bytes = b"") -> None:
-        cycle = SimpleNamespace(response_complete=True, more_body=more_body)
-        self.cycle = cycle if asked else None
-        self.conn = SimpleNamespace(trailing_data=(began, False))
-        self.transport, self.aborted = self, False
-
-    def is_closing(self) -> bool:
-        return False
-
-    def get_write_buffer_size(self) -> int:
-        return 0
-
-    def abort(self) -> None:
-        self.aborted = True
+def connected(*, asked: bool = True, more_body: bool = False, began: bytes = b"") -> Mock:
+    """A connection as uvicorn keeps it; with or without a request before."""
+    cycle = SimpleNamespace(response_complete=True, more_body=more_body)
+    transport = Mock(**{"is_closing.return_value": False, "get_write_buffer_size.return_value": 0})
+    conn = SimpleNamespace(trailing_data=(began, False))
+    return Mock(cycle=cycle if asked else None, conn=conn, transport=transport)
 
 
 def test_in_a_crowd_idle_connections_end_but_none_on_which_a_request_may_be_under_way() -> None:
     """A proxy keeps connections between two requests, and may send the next at any moment."""
     server = PromptServer(uvicorn.Config("unused:app"), head_seconds=10, most=0)
-    rests = Connected()
-    others = [Connected(asked=False), Connected(more_body=True), Connected(began=b"GET /")]
-    server.server_state.connections = {rests, *others}  # type: ignore[assignment]
-    server._end_idle(0.0)
-    assert [one.aborted for one in (rests, *others)] == [False] * 4
-    server._end_idle(1.0)
-    assert [one.aborted for one in (rests, *others)] == [False, True, True, True]
-    server._end_idle(11.0)
-    assert rests.aborted
+    every = [connected(), connected(asked=False), connected(more_body=True), connected(began=b"G")]
+    server.server_state.connections = set(every)
+    for now, ended in (0.0, [False] * 4), (1.0, [False, True, True, True]), (11.0, [True] * 4):
+        server._end_idle(now)
+        assert [one.transport.abort.called for one in every] == ended
 
 
 def test_an_idle_server_stops_at_once() -> None:
