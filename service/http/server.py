@@ -100,8 +100,7 @@ class PromptServer(uvicorn.Server):
         connections = self.server_state.connections
         before, self._idle = self._idle, {}
         for connection in connections:
-            # Of the one protocol that is served here.
-            cycle: Any = getattr(connection, "cycle", None)
+            cycle = _cycle_of(connection)
             closing = connection.transport.is_closing()
             if closing or cycle is None or cycle.response_complete or _answered(cycle):
                 untaken = connection.transport.get_write_buffer_size()
@@ -110,26 +109,26 @@ class PromptServer(uvicorn.Server):
                 self._idle[connection] = (since if rests else now, cycle, untaken)
         too_many = len(connections) - self._most
         for connection in sorted(self._idle, key=lambda connection: self._idle[connection][0]):
-            waited = now - self._idle[connection][0]
+            since, cycle, untaken = self._idle[connection]
+            waited = now - since
             # One that has just come may have sent its head. One that rests, as a proxy keeps them,
             # may be sent a request at this moment, which would be lost with it.
-            crowded = too_many > 0 and waited > 0 and not _rests(connection)
+            over = cycle is not None and cycle.response_complete and not cycle.more_body
+            between = over and not untaken and not connection.conn.trailing_data[0]
+            crowded = too_many > 0 and waited > 0 and not between
             if waited >= self._head_seconds or crowded:
                 connection.transport.abort()
                 too_many -= 1
 
 
+def _cycle_of(connection: Any) -> Any:
+    """Return the last request of a connection and its answer, as uvicorn's h11 keeps them."""
+    return getattr(connection, "cycle", None)
+
+
 def _answered(cycle: Any) -> bool:
     """Return whether the whole answer was sent, and its end only waits for the request's."""
     return cycle.scope["state"].get("answered", False)
-
-
-def _rests(connection: Any) -> bool:
-    """Return whether a request and its answer are over, and nothing of the next has come."""
-    cycle = connection.cycle
-    over = cycle is not None and cycle.response_complete and not cycle.more_body
-    untaken = connection.transport.get_write_buffer_size()
-    return over and not untaken and not connection.conn.trailing_data[0]
 
 
 class DrainingServer(PromptServer):
@@ -226,7 +225,7 @@ class DrainingServer(PromptServer):
 
     def _end_answered(self) -> None:
         for connection in tuple(self.server_state.connections):
-            cycle: Any = getattr(connection, "cycle", None)
+            cycle = _cycle_of(connection)
             if cycle is not None and _answered(cycle):
                 connection.transport.abort()
 
@@ -237,7 +236,7 @@ class DrainingServer(PromptServer):
         for server in self.servers:
             server.close()
         for connection in tuple(self.server_state.connections):
-            cycle: Any = getattr(connection, "cycle", None)
+            cycle = _cycle_of(connection)
             if cycle is not None and cycle.response_complete:
                 # What is still to be sent is sent.
                 connection.transport.close()

@@ -60,9 +60,9 @@ class Workers:
         self._known: dict[ProcessPool, Sequence[MemoryFile]] = {}
         self._stopping = False
         self.restarts: Counter[str] = Counter()
-        """How often a process was replaced, by cause."""
+        """Number of replaced processes, by cause."""
         self.warmed = False
-        """Whether a worker has ever warmed up."""
+        """True once a worker has warmed up."""
 
     @property
     def ready(self) -> bool:

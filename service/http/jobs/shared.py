@@ -47,7 +47,7 @@ class SharedJobs:
     def __init__(self, service: Service, store: JobStore) -> None:
         self.store = store
         self.reached = True
-        """Whether the store answered when it was last looked at."""
+        """True while the store answers, as of the last look."""
         self._service = service
         settings = service.settings
         self._room = Room(int(settings.result_bytes), settings.results)
@@ -160,8 +160,8 @@ class SharedJobs:
         """Take the jobs of replicas that have died, one after the other."""
         while True:
             await asyncio.sleep(LEASE_SECONDS / 4)
-            self.reached = await self.store.answers()
             try:
+                self.reached = await self.store.answers()
                 while not self._service.admission.draining and await self._adopt():
                     pass
             except StoreError as error:

@@ -39,10 +39,10 @@ def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
     return client.post("/subdivide", content=body, headers=GLB)
 
 
-def request_head(length: int, *, extra: str = "") -> bytes:
+def request_head(length: int, *, extra: str = "", kind: str = "model/gltf-binary") -> bytes:
     return (
-        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
-        f"Content-Length: {length}\r\n{extra}\r\n"
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\n"
+        f"Content-Type: {kind}\r\nContent-Length: {length}\r\n{extra}\r\n"
     ).encode()
 
 
@@ -236,9 +236,9 @@ def test_who_is_refused_while_sending_and_wants_the_connection_closed_reads_why(
     address: tuple[str, int], first_line: str
 ) -> None:
     """Closed at once, it would be reset, and the answer lost."""
-    head = request_head(8 * MIB).replace(b"HTTP/1.1", first_line.encode(), 1)
+    head = request_head(8 * MIB, kind="a/b").replace(b"HTTP/1.1", first_line.encode(), 1)
     with socket.create_connection(address, timeout=600) as connection:
-        connection.sendall(head.replace(b"gltf", b"x") + bytes(8 * MIB))
+        connection.sendall(head + bytes(8 * MIB))
         assert received(connection).startswith(b"HTTP/1.1 415 ")
 
 
@@ -247,9 +247,7 @@ def test_who_is_refused_and_stops_sending_is_let_go() -> None:
         served(workers=1, head_seconds=1) as where,
         socket.create_connection(where, timeout=600) as connection,
     ):
-        connection.sendall(
-            request_head(10**6, extra="Connection: close\r\n").replace(b"gltf", b"x")
-        )
+        connection.sendall(request_head(10**6, extra="Connection: close\r\n", kind="a/b"))
         assert connection.recv(2**16).startswith(b"HTTP/1.1 415 ")
         wait_for_the_end(connection)
 
@@ -276,7 +274,7 @@ def test_a_client_that_sends_what_nobody_reads_does_not_hold_a_shutdown_up(
 ) -> None:
     with served(workers=1) as where:
         connection = socket.create_connection(where, timeout=600)
-        connection.sendall(request_head(10**6, extra="Connection: close\r\n").replace(b"gl", b""))
+        connection.sendall(request_head(10**6, extra="Connection: close\r\n", kind="a/b"))
         assert connection.recv(2**16).startswith(b"HTTP/1.1 415 ")
     with connection:
         wait_for_the_end(connection)
