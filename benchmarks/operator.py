@@ -37,8 +37,8 @@ def _measure(faces: int, method: str, runs: int, source: str | None) -> Measured
     vertices, triangles = mesh.vertices.copy(), mesh.faces.copy()
     model = load_model(source)
     work: dict[str, Callable[[], object]] = {
-        "loop": lambda: refine(mesh, loop(), 1),
-        "pns": lambda: refine(mesh, pns(model), 1),
+        "loop": lambda: refine(mesh, loop(), 1, limit=False),
+        "pns": lambda: refine(mesh, pns(model), 1, limit=False),
         "trimesh loop": lambda: trimesh.remesh.subdivide_loop(vertices, triangles),
     }
     work[method]()  # warm: imports, threads, the allocator

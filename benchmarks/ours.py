@@ -25,7 +25,7 @@ def main(name: str, path: str, levels: str) -> None:
     scheme = base if method == "loop" else pns(load_model(method))
 
     def run() -> tuple[np.ndarray, np.ndarray]:
-        refined = refine(Mesh(points, wide), scheme, int(levels))
+        refined = refine(Mesh(points, wide), scheme, int(levels), limit=False)
         if report:
             assert len(refined.report["levels"]) == int(levels)
         return refined.mesh.vertices, refined.mesh.faces

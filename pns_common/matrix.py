@@ -6,7 +6,7 @@ as a sparse array of scipy.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,9 @@ from pns_common.topology import Topology
 
 # Colours that go through the masks at once: two columns each.
 TOGETHER = 12
+
+# Columns of vertices → columns of new vertices, or of the same at their limits.
+Place = Callable[[np.ndarray, Topology, Blocks], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,22 +62,28 @@ class SubdivisionMatrix:
 
 
 def subdivision_matrix(
-    topologies: Sequence[Topology], base: BaseScheme, blocks: Blocks | None = None
+    topologies: Sequence[Topology],
+    base: BaseScheme,
+    blocks: Blocks | None = None,
+    at_last: Place | None = None,
 ) -> SubdivisionMatrix:
     """Return S with S @ values = ``columns.refine_columns(values, topologies, base)``, to rounding.
 
     The masks are read from ``base.place`` itself: from columns of ones at vertices that no row has
-    two of, of which a mesh needs a few more than its largest valence.
+    two of, of which a mesh needs a few more than its largest valence. `at_last` are masks to apply
+    to the refined mesh: ``limit_positions``.
     """
     blocks = blocks or Blocks()
-    made = _level_matrix(topologies[0], base, blocks)
+    made = _mask_matrix(topologies[0], base.place, blocks)
     for topology in topologies[1:]:
-        made = _product(_level_matrix(topology, base, blocks), made)
+        made = _product(_mask_matrix(topology, base.place, blocks), made)
+    if at_last is not None:
+        made = _product(_mask_matrix(base.split(topologies[-1], blocks), at_last, blocks), made)
     return made
 
 
-def _level_matrix(topology: Topology, base: BaseScheme, blocks: Blocks) -> SubdivisionMatrix:
-    """Return S of one level, whose rows read the corners of the faces around one vertex."""
+def _mask_matrix(topology: Topology, place: Place, blocks: Blocks) -> SubdivisionMatrix:
+    """Return the matrix of masks whose rows read the corners of the faces around one vertex."""
     count = topology.vertex_count
     order = np.argsort(topology.corners, kind="stable")
     starts = np.searchsorted(topology.corners[order], np.arange(count + 1))
@@ -87,7 +96,7 @@ def _level_matrix(topology: Topology, base: BaseScheme, blocks: Blocks) -> Subdi
     named, size = np.arange(1, count + 1, dtype=np.float64), 0
     for first in range(0, colours, TOGETHER):
         here = colour[:, None] == np.arange(first, min(first + TOGETHER, colours))
-        placed = base.place(np.hstack([here, here * named[:, None]]), topology, blocks)
+        placed = place(np.hstack([here, here * named[:, None]]), topology, blocks)
         size, (ones, numbers) = len(placed), np.split(placed, 2, axis=1)
         rows, which = np.nonzero(ones > 0)
         weights = ones[rows, which]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any, Literal, SupportsIndex
 
 import numpy as np
@@ -123,10 +123,11 @@ class Refinement:
 
         S with a row for each refined vertex and a column for each control vertex: ``S @ values``
         carries values of vertices to the refined mesh. It holds the base scheme's masks over all
-        levels; what a model adds to positions, and the step to the limit surface, are not linear or
-        no part of it.
+        levels and its limit masks; what a model adds to positions is not linear and no part of it.
         """
-        made = subdivision_matrix(self.topologies, self.scheme.base)
+        base = self.scheme.base
+        to_limit = None if self.normals is None else partial(limit_positions, base=base)
+        made = subdivision_matrix(self.topologies, base, at_last=to_limit)
         if self.selected is None:
             return made
         return made.unmoved(self.selected.still).take(self.selected.vertices)
@@ -148,7 +149,7 @@ def refine(
     levels: SupportsIndex = DEFAULT_LEVELS,
     reference_length: float | str = "auto",
     *,
-    limit: bool = False,
+    limit: bool = True,
     creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
     border: Literal["smooth", "corners", "fixed"] | None = None,
     faces: Any = None,
@@ -169,7 +170,10 @@ def refine(
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         limit: put the last level's vertices where the base scheme would take them if it were
-            applied for ever, and return the limit surface's normals there.
+            applied for ever, and return the limit surface's normals there: then the number of
+            levels says how fine the mesh is and no longer changes its shape. False: leave them as
+            they are, as control points of what follows. A base scheme without limit masks leaves
+            them in either case.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
             1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
             as sharp as the sharpness network finds it; none without one. None: no edge.
@@ -197,6 +201,7 @@ def refine(
     kept = chosen_creases(creases, scheme.creases)
     kept = kept if border is None else replace(kept, border=border)
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
+    limit = limit and scheme.base.limit is not None
     told = _progress(children, count, learned if scheme.rule else 0, limit, progress)
     blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
     chosen = None if faces is None else chosen_faces(faces, mesh.face_count)
@@ -295,7 +300,7 @@ def refine_many(
     levels: SupportsIndex = DEFAULT_LEVELS,
     reference_length: float | str = "auto",
     *,
-    limit: bool = False,
+    limit: bool = True,
     threads: int | None = None,
 ) -> list[Refinement]:
     """Refine meshes one after the other, each with its own creases; None: no edge."""

@@ -1,6 +1,6 @@
 """Learned sharpness: how sharp a network finds each edge of the control mesh.
 
-    w_e = γ_e σ_e        γ_e = tanh(c_v x_e),   x_e = 1 − n1 · n2
+    w_e = max(0, (γ_e σ_e − ε) / (1 − ε))       γ_e = tanh(c_v x_e),  x_e = 1 − n1 · n2,  ε = 1e-5
 
 σ in [0, 1] is the network's answer to the features ψ_e (``crease-53``, docs/reference): the turn
 of the edge, of its wing edges and of what goes on at both ends, and how even and how bent the whole
@@ -31,6 +31,8 @@ from pns_common.topology import Topology
 
 # Below 1, since what is marked as sharp for good changes the features of corrections beside it.
 SHARPEST = 1 - 2.0**-52
+# What is less sharp is smooth: a sigmoid is never 0, and sharp edges cost time at every level.
+LEAST_SHARPNESS = 1e-5
 # Spread of the edges' lengths, and shares of edges beyond each ramp of turns.
 WHOLE = 1 + kernels.STEPS
 CREASE_53 = kernels.LOCAL + WHOLE
@@ -117,7 +119,9 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
     def ask(begin: int, end: int) -> None:
         asked = rows[begin:end]
         answers = checked_answers(network, seen.features(asked), 1)
-        made[asked] = np.minimum(gate[asked] * np.clip(answers[:, 0], 0.0, 1.0), SHARPEST)
+        w = gate[asked] * np.clip(answers[:, 0], 0.0, 1.0)
+        w = np.maximum(w - LEAST_SHARPNESS, 0.0) / (1 - LEAST_SHARPNESS)
+        made[asked] = np.minimum(w, SHARPEST)
 
     level.blocks.quiet().of_rows(NETWORK_ROWS).run(len(rows), ask)
     return made

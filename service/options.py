@@ -21,7 +21,7 @@ else:  # A type checker cannot see the names that a table gives.
     SchemeName = Literal["auto", "pns", *BASE_SCHEMES]
 Diagnostics = Literal["summary", "full", "none"]
 UvRule = Literal["linear", "smooth"]
-NormalRule = Literal["auto", "keep", "smooth", "limit"]
+NormalRule = Literal["auto", "keep", "smooth"]
 WeldRule = Literal["position", "index", "off"]
 BorderRule = Literal["smooth", "corners", "fixed"]
 PolygonRule = Literal["auto", "off"]
@@ -41,8 +41,8 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface; `polygons` joins triangles of a glTF; `material` and `group` name
-    the faces to refine (None: all). Raises InvalidParameter.
+    vertices on the limit surface, with its normals; `polygons` joins triangles of a glTF;
+    `material` and `group` name the faces to refine (None: all). Raises InvalidParameter.
     """
 
     levels: int = DEFAULT_LEVELS
@@ -60,7 +60,7 @@ class Options:
     material: str | None = None
     group: str | None = None
     compress: Compression = "none"
-    limit: bool = False
+    limit: bool = True
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -75,8 +75,6 @@ class Options:
         check_choice("weld", self.weld, get_args(WeldRule))
         check_choice("border", self.border, get_args(BorderRule))
         check_choice("polygons", self.polygons, get_args(PolygonRule))
-        if self.normals == "limit" and not self.limit:
-            raise InvalidParameter("normals", "normals=limit needs limit=true: they stand there")
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         if self.reference_length != "auto" and not (
@@ -133,8 +131,8 @@ DESCRIPTIONS = {
     "uv": "smooth: Loop's stencil inside charts; their boundaries stay linear",
     "normals": "shading. auto: the file's normals; new ones, smooth but across sharp edges, where "
     "a mesh of a glTF has none, and where most faces are shaded flat and crease is off. keep: the "
-    "file's, or none. smooth: new ones for every mesh. limit: those of the limit surface, with the "
-    "option limit",
+    "file's, or none. smooth: new ones for every mesh. New ones are those of the limit surface, "
+    "if the vertices are on it",
     "crease": "edges to keep sharp. auto: those that the model finds, and those that a glTF's "
     "shading marks. angle: and degrees, as in angle:40: edges that bend by more. normals: edges "
     "where the file's normals differ. off: none, everything becomes round",
@@ -151,7 +149,8 @@ DESCRIPTIONS = {
     "of a node that shows it",
     "compress": "how a glTF's geometry is written. meshopt: exact. draco: smaller; positions, "
     "normals and UVs are rounded",
-    "limit": "put each vertex where endless refinement would take it, on the limit surface",
+    "limit": "put each vertex where endless refinement would take it, on the limit surface: then "
+    "more levels give a finer mesh of one shape. Off: control points for further refinement",
 }
 
 

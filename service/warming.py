@@ -28,7 +28,7 @@ def warm_up(announce: Callable[[str], None]) -> int:
         partial(subdivide_gltf, file, "glb", options, model, Limits())
         for options in (
             Options(),
-            Options(levels=1, limit=True, normals="limit", uv="smooth", weld_tolerance=0.001),
+            Options(levels=1, normals="smooth", uv="smooth", weld_tolerance=0.001),
         )
     ]
     return warm_up_library(announce, more=files)

@@ -69,6 +69,8 @@ def _place(parameter: inspect.Parameter) -> int:
 
 def _described(name: str) -> Any:
     flag = f"--{name.replace('_', '-')}"
+    if name == "limit":
+        flag += "/--no-limit"
     return typer.Option(
         flag,
         help=DESCRIPTIONS[name],

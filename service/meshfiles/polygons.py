@@ -19,7 +19,7 @@ from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine
 from pns_common.report import Report
-from pns_common.rows import distinct_rows, number_by_first_appearance
+from pns_common.rows import distinct_rows, dot, number_by_first_appearance
 from pns_common.schemes import CATMULL_CLARK, Scheme
 from pns_common.topology import following
 
@@ -212,14 +212,11 @@ def _with_layers(
         for name, layer in mesh.layers.items():
             layers[name] = _kept(layers[name], selected.places, still, layer, source)
     if options.normals == "smooth":
-        layers[NORMAL] = _smooth_normals(made)
+        layers[NORMAL] = _on_limit(_smooth_normals(made), made, still)
     elif NORMAL in layers:
         before = layers[NORMAL]
-        layers[NORMAL] = _with(_normals(made.mesh, before.rows), still, before, still)
-    if made.normals is not None and options.normals == "limit":
-        layers[NORMAL] = Layer(made.normals, corners)
-        if len(still):
-            layers[NORMAL] = _with(layers[NORMAL], still, _normals(made.mesh, corners), still)
+        own = _on_limit(_normals(made.mesh, before.rows), made, still)
+        layers[NORMAL] = _with(own, still, before, still)
     if options.diagnostics == "full":
         scalars = {RATIO: made.ratio, GATE: made.gate}
         layers |= {
@@ -304,6 +301,24 @@ def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
         rows[0].flags.writeable = False  # as those of quads, for which the kernel is compiled
     normals = angle_weighted_normals(mesh.vertices, *rows, count, blocks, triangles)
     return Layer(safe_unit(normals), np.where(groups >= 0, number, NONE))
+
+
+def _on_limit(layer: Layer, made: Refinement, still: Int[np.ndarray, " S"]) -> Layer:
+    """Return the limit surface's normals for groups that are alone at their vertex.
+
+    `still` are the corners that were not refined.
+    """
+    if made.normals is None:
+        return layer
+    vertex, corners = np.empty(len(layer.values), dtype=np.int64), made.mesh.corners
+    used = layer.rows != NONE
+    vertex[layer.rows[used]] = corners[used]
+    exact = made.normals[vertex]
+    alone = (np.bincount(vertex, minlength=len(made.normals)) == 1)[vertex] & exact.any(axis=1)
+    alone[layer.rows[still]] = False
+    # A face that is turned over shows the other side.
+    side = np.where(dot(exact, layer.values) < 0, -1.0, 1.0)[:, None]
+    return Layer(np.where(alone[:, None], side * exact, layer.values), layer.rows)
 
 
 def _covering(mesh: Mesh) -> Int[np.ndarray, "T 3"]:

@@ -6,7 +6,8 @@ from typer.testing import CliRunner
 
 import export.run
 from export.published import export_published
-from pns_common import ModelError, load_model, pns, refine
+from pns_common import ModelError, load_model, pns
+from tests.support.control_points import refine
 from tests.support.networks import published_model
 from tests.support.shared import published, shared_path
 from train.data.datasets import ridge_held_out

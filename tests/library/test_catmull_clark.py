@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop, refine
+from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop
 from pns_common.columns import level_topologies, refine_columns
 from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
@@ -13,6 +13,7 @@ from pns_common.quads import split_quads
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.topology import EdgeClass, build_topology
 from tests.support import opensubdiv
+from tests.support.control_points import refine
 from tests.support.meshes import bent, manifolds
 from tests.support.polygons import (
     SHAPES,

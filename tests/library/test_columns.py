@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns
 from pns_common.columns import (
     ColumnRefinement,
     level_topologies,
@@ -16,6 +16,7 @@ from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP, catmull_clark
 from pns_common.topology import build_topology
+from tests.support.control_points import refine
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
 
 

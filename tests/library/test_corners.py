@@ -5,16 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pns_common import (
-    Creases,
-    Mesh,
-    ParameterError,
-    catmull_clark,
-    load_model,
-    loop,
-    pns,
-    refine,
-)
+from pns_common import Creases, Mesh, ParameterError, catmull_clark, load_model, loop, pns
 from pns_common.charts import refine_corners
 from pns_common.columns import refine_columns
 from pns_common.interop.carried import CarriedMesh, refine_carried
@@ -22,6 +13,7 @@ from pns_common.limit import limit_positions
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
 from tests.support import opensubdiv
+from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
 from tests.support.polygons import SHAPES, polygon_manifolds, polygon_soups, uneven
 

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Creases, Mesh, catmull_clark, pns, refine
+from pns_common import Creases, Mesh, catmull_clark, pns
 from pns_common.columns import level_topologies
 from pns_common.limit import limit_positions
 from pns_common.operator import edge_inputs, face_inputs, pushes, vertex_inputs
 from pns_common.refinement import control_level
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.topology import EdgeClass
+from tests.support.control_points import refine
 from tests.support.meshes import bent, manifolds, rotation
 from tests.support.networks import DEFAULT_CARD, TiedPolygonModel, polygon_model
 from tests.support.polygons import (

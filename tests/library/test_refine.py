@@ -1,6 +1,7 @@
 """refine: the report, determinism, and levels that compose."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, loop, parallel, pns, refine, refine_many
+from pns_common import Mesh, MeshError, Scheme, loop, parallel, pns, refine, refine_many
 from pns_common.model.session import Model
+from pns_common.schemes import LOOP
 from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
@@ -92,6 +94,21 @@ def test_bits_do_not_depend_on_threads_or_block_size(monkeypatch):
         assert refined.report == expected.report
 
 
+def test_more_levels_give_a_finer_mesh_of_one_surface():
+    mesh = Mesh(*bumpy_sphere())
+    coarse = refine(mesh, "pns", 1, creases=None).mesh.vertices
+    fine = refine(mesh, "pns", 3, creases=None).mesh.vertices
+    np.testing.assert_allclose(fine[: len(coarse)], coarse, rtol=0, atol=1e-12)
+
+
+def test_without_limit_masks_vertices_stay_at_the_last_level():
+    mesh = Mesh(*bumpy_sphere())
+    made = refine(mesh, Scheme("loop", replace(LOOP, limit=None)), 1)
+    assert made.normals is None
+    expected = refine(mesh, loop(), 1, limit=False).mesh.vertices
+    np.testing.assert_array_equal(made.mesh.vertices, expected)
+
+
 def test_many_meshes_are_refined_as_each_alone():
     meshes = [Mesh(*bumpy_sphere(seed)) for seed in range(3)]
     together = refine_many([(mesh, None) for mesh in meshes], pns(MODEL), 2)
@@ -121,7 +138,7 @@ def test_an_exception_of_progress_ends_the_refinement():
 
 def test_two_calls_with_the_first_ones_length_are_two_levels():
     mesh = Mesh(*bumpy_sphere())
-    once = refine(mesh, pns(MODEL), 1)
+    once = refine(mesh, pns(MODEL), 1, limit=False)
     length = once.report["reference_length"]
     again = refine(once.mesh, pns(MODEL), 1, length)
     both = refine(mesh, pns(MODEL), 2)

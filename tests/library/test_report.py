@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, load_model, loop, pns, refine
+from pns_common import Mesh, load_model, loop, pns
+from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, grid, icosphere, manifolds, soups
 from tests.support.networks import default_model
 

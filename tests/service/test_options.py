@@ -67,7 +67,7 @@ def test_a_wrong_crease_is_answered_with_an_example():
         {"uv": "smooth", "crease": "angle:180", "weld_tolerance": 0.01},
         {"crease": "normals"},
         {"crease": "off"},
-        {"normals": "limit", "limit": True},
+        {"normals": "smooth", "limit": False},
     ],
 )
 def test_values_in_range_are_taken(options):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from pns_common import Mesh, MeshError, Scheme, load_model, loop, pns, refine
+from pns_common import Mesh, MeshError, Scheme, load_model, loop, pns
 from tests.support import schemes
+from tests.support.control_points import refine
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, one_way_pair, three_pages
 from tests.support.networks import default_model, huge_model, random_model
 from tests.support.shared import shared_path

@@ -12,8 +12,9 @@ from onnx import helper
 from typer.testing import CliRunner
 
 import train.run
-from pns_common import loop, pns, refine
+from pns_common import loop, pns
 from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
+from tests.support.control_points import refine
 from tests.support.networks import (
     CARD,
     breaking_off_bytes,

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, Scheme, catmull_clark, pns, refine
+from pns_common import Mesh, Scheme, catmull_clark, pns
 from pns_common.schemes import CATMULL_CLARK
+from tests.support.control_points import refine
 from tests.support.networks import POLYGON_CARD, TiedPolygonModel
 from tests.support.polygons import SHAPES, quad_star, uneven
 from train.certificates.bodies import polygon_bodies

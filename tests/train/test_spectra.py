@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from pns_common import ParameterError, load_model, loop, pns, refine
+from pns_common import ParameterError, load_model, loop, pns
+from tests.support.control_points import refine
 from train.certificates.adversary import Operator
 from train.certificates.gap_collapse import margin_gradient, operator_jacobian
 from train.connectivity import connect

@@ -10,7 +10,8 @@ import pytest
 import torch
 import trimesh
 
-from pns_common import Mesh, ParameterError, clean, load_model, loop, pns, refine
+from pns_common import Mesh, ParameterError, clean, load_model, loop, pns
+from tests.support.control_points import refine
 from tests.support.meshes import grid
 from tests.support.recipes import tiny
 from tests.support.shared import shared_path

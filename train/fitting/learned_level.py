@@ -28,7 +28,7 @@ from pns_common.matrix import subdivision_matrix
 from pns_common.parallel import Blocks
 from pns_common.refinement import control_level
 from pns_common.schemes.scheme import named_scheme
-from pns_common.sharpness import sharpness_inputs
+from pns_common.sharpness import LEAST_SHARPNESS, sharpness_inputs
 from pns_common.topology import Topology
 from train.curve_rule import curve_push
 from train.data.batch import joined_meshes
@@ -116,7 +116,10 @@ class LearnedLevel:
 
     def sharpness(self, logits: Float[Tensor, " I"]) -> Sharpness:
         """Return w: 1 at boundaries."""
-        w = self.on_boundary.double().index_put((self.interior,), self.cap * torch.sigmoid(logits))
+        found = (self.cap * torch.sigmoid(logits) - LEAST_SHARPNESS).clamp(0) / (
+            1 - LEAST_SHARPNESS
+        )
+        w = self.on_boundary.double().index_put((self.interior,), found)
         return around_vertices(self.edges, w, len(self.points))
 
     def smooth_sharpness(self) -> Sharpness:

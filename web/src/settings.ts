@@ -15,7 +15,7 @@ export interface Settings {
   weld: boolean;
   /** Join a glTF's triangles that are one polygon, and refine quads. */
   polygons: boolean;
-  normals: "auto" | "keep" | "smooth" | "limit";
+  normals: "auto" | "keep" | "smooth";
 }
 
 /** Settings for one file, and those that the user wants for any file: a large file may close levels. */
@@ -62,7 +62,7 @@ export const DEFAULTS: Settings = {
   levels: 2,
   model: "",
   budget: null,
-  limit: false,
+  limit: true,
   crease: "auto",
   angle: 60,
   uv: "linear",
@@ -95,7 +95,7 @@ export function query(settings: Settings, classic: Classic, writing: Writing = {
   });
   if (!base && settings.model) parameters.set("model", settings.model);
   if (!base && settings.budget !== null) parameters.set("budget", String(settings.budget));
-  if (settings.limit) parameters.set("limit", "true");
+  if (!settings.limit) parameters.set("limit", "false");
   if (settings.weld) parameters.set("weld_tolerance", WELD);
   if (settings.polygons) parameters.set("polygons", "auto");
   if (settings.normals !== "auto") parameters.set("normals", settings.normals);
@@ -126,14 +126,13 @@ export function fromHash(hash: string): { settings: Settings; view: Record<strin
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
-  // The service refuses exact normals anywhere but on the limit surface.
-  settings.limit = limit === "true" || normals === "limit";
+  settings.limit = limit !== "false";
   settings.crease = oneOf(crease, ["auto", "angle", "normals", "off"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
   settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
   settings.weld = weld === "true";
   settings.polygons = polygons === "true";
-  settings.normals = oneOf(normals, ["auto", "keep", "smooth", "limit"]) ?? settings.normals;
+  settings.normals = oneOf(normals, ["auto", "keep", "smooth"]) ?? settings.normals;
   return { settings, view };
 }
 

@@ -60,7 +60,7 @@ describe("access", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.click(".more summary");
     const limit = await page.locator("#limit").boundingBox();
     assert.ok((await lit(limit)) > 1);
-    await page.check("#limit");
+    await page.uncheck("#limit");
     assert.ok((await lit(limit)) > 1);
     await choose(page, example);
     await settled(page);

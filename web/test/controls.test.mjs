@@ -78,18 +78,6 @@ describe("controls", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(await page.evaluate(() => location.hash), /angle=25\.5/);
   });
 
-  test("normals of the limit surface and the limit surface come and go together", async () => {
-    const page = await visit({ hash: "#levels=1&normals=limit" });
-    assert.ok(await page.isChecked("#limit"));
-    await choose(page, example);
-    await settled(page);
-    await page.click(".more summary");
-    await page.uncheck("#limit");
-    assert.equal(await page.inputValue("#normals"), "auto");
-    await page.selectOption("#normals", "limit");
-    assert.ok(await page.isChecked("#limit"));
-  });
-
   test("a link restores the settings", async () => {
     const page = await visit();
     await choose(page, example);

@@ -100,8 +100,9 @@ class Settings:
     )
     limit: BoolProperty(
         name="On Limit Surface",
-        description="Put the vertices where further levels would take them in the end",
-        default=False,
+        description="Put the vertices where further levels would take them in the end, so that "
+        "more levels give a finer mesh of one shape",
+        default=True,
     )
     crease_angle: FloatProperty(
         name="Crease Angle",

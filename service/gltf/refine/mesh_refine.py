@@ -41,7 +41,7 @@ class RefinedMesh:
         cut: (P,) number of vertices of each part that lost a joint for lack of slots.
         lost: (P,) the largest share of a vertex's weight that these had.
         scalars: further attributes by name.
-        limit_normals: normals to use in place of those of the faces; None: none.
+        limit_normals: of the limit surface, if the vertices are on it.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
     """
@@ -143,7 +143,7 @@ def refined_mesh(
         [made.report],
         *refined_skin_and_morph(control, faces, levels, options, course, base=base),
         _scalars(made, options),
-        made.normals if options.normals == "limit" else None,
+        made.normals,
         made.parents if traced else None,
         levels[0],
     )
@@ -180,7 +180,7 @@ def refined_union(
         [each.report for each in made],
         *_skin_and_morph_of_union(control, parts, faces, creases, options, course),
         {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
-        np.concatenate(normals) if options.normals == "limit" else None,
+        np.concatenate(normals) if normals else None,
     )
 
 

@@ -353,24 +353,26 @@ def shade(
     """Return the normals of a refined mesh with vertices at `points`; None without normals.
 
     `ids` are the refined vertices at the grid points of the faces of each primitive.
-    `limit_normals`, if given, replace those of the faces.
+    `limit_normals`, if given, replace those of the faces, but for the author's own.
     """
     groups = normal_groups(control, ids, grid)
     if groups is None:
         return None
     poses = 1 + len(skin_and_morph.deltas)
     with course.part(GROUPING, GROUPING + (1 - GROUPING) / poses):
-        rest = groups.normals(points, groups.before, course)
-        rest = groups.with_own(rest, None)
+        of_faces = exact = groups.normals(points, groups.before, course)
         if limit_normals is not None:
-            rest = groups.with_limit(rest, limit_normals)
+            exact = groups.with_limit(of_faces, limit_normals)
+        rest = groups.with_own(exact.copy(), None)
     morphed: list[Float[np.ndarray, "G 3"] | None] = []
     with course.part(GROUPING + (1 - GROUPING) / poses, 1.0):
         for target, delta in enumerate(skin_and_morph.deltas):
             with course.part(target / (poses - 1), (target + 1) / (poses - 1)):
                 normals = None
                 if _moves_normals(control, target):
-                    posed = groups.normals(points + delta, lambda: rest, course)
+                    posed = groups.normals(points + delta, lambda: of_faces, course)
+                    if limit_normals is not None:  # what does not move keeps its normal
+                        posed = safe_unit(exact + (posed - of_faces))
                     normals = groups.with_own(posed, target).astype(np.float32)
                 morphed.append(normals)
     return Shading(groups, rest, tuple(morphed))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,8 +29,9 @@ KINDS = sorted(set(media.KINDS) - set(media.GLTF_KINDS))
 SQUARE = ("0 0 0", "1 0 0", "1 1 0", "0 1 0")
 
 
-def refined(mesh_file: MeshFile, levels: int = 1) -> tuple[MeshFile, dict]:
-    return refine_mesh_file(mesh_file, loop(), Options(levels=levels, scheme="loop"), Limits())
+def refined(mesh_file: MeshFile, **options: Any) -> tuple[MeshFile, dict]:
+    chosen = Options(**{"levels": 1, "scheme": "loop"} | options)
+    return refine_mesh_file(mesh_file, loop(), chosen, Limits())
 
 
 def uv_of(mesh_file: MeshFile) -> np.ndarray:
@@ -113,7 +115,7 @@ def test_seams_make_no_difference_to_the_surface() -> None:
 
 def test_loop_positions_equal_trimeshs_on_a_closed_mesh() -> None:
     mesh_file = part()
-    fine, _ = refined(of_triangles(mesh_file.vertices, mesh_file.faces))
+    fine, _ = refined(of_triangles(mesh_file.vertices, mesh_file.faces), limit=False)
     closed = trimesh.Trimesh(mesh_file.vertices, mesh_file.faces, process=False)
     closed.merge_vertices(digits_vertex=12)
     vertices, faces = trimesh.remesh.subdivide_loop(closed.vertices, closed.faces, 1)
@@ -135,7 +137,7 @@ def test_texture_coordinates_are_linear_along_edges() -> None:
 def test_double_precision_survives() -> None:
     # So far from the origin, float32 has steps of 1/32.
     corners = np.array([[512_000.01, 0, 0], [512_001.02, 0, 0], [512_000.03, 1, 0]])
-    fine, _ = refined(of_triangles(corners, np.array([[0, 1, 2]])))
+    fine, _ = refined(of_triangles(corners, np.array([[0, 1, 2]])), limit=False)
     middle = fine.vertices[fine.faces[0, 1]]
     np.testing.assert_array_equal(middle, (corners[0] + corners[1]) / 2)
     again = formats.read(formats.write(fine, "obj"), "obj")

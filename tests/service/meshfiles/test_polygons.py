@@ -216,14 +216,18 @@ def test_edges_that_a_model_keeps_sharp_break_the_shading_of_quads() -> None:
     assert (np.einsum("scx,sx->sc", normals, sides) > np.cos(np.radians(10))).all()
 
 
-@pytest.mark.parametrize("normals", ["keep", "smooth", "limit"])
-def test_normals_beside_chosen_polygons_are_those_of_what_is_left(normals: str) -> None:
+@pytest.mark.parametrize(
+    ("normals", "limit"), [("keep", False), ("smooth", False), ("smooth", True)]
+)
+def test_normals_beside_chosen_polygons_are_those_of_what_is_left(
+    normals: str, limit: bool
+) -> None:
     outward = np.array(CORNERS) / 3**0.5
     text = "".join(f"vn {x} {y} {z}\n" for x, y, z in outward.tolist()) + TOPPED.decode()
     for quad in QUADS:
         plain = " ".join(f"{v + 1}/{k + 1}" for k, v in enumerate(quad))
         text = text.replace(plain, " ".join(f"{v + 1}/{k + 1}/{v + 1}" for k, v in enumerate(quad)))
-    options: dict[str, Any] = {"normals": normals, "limit": normals == "limit"}
+    options: dict[str, Any] = {"normals": normals, "limit": limit}
     written = made(text.encode(), "obj", "obj", group="top", **options)
     mesh = formats.read_polygons(written.content, "obj")
     got = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows]
@@ -282,6 +286,7 @@ def test_smooth_uvs_of_quads_follow_the_positions_and_their_creases(crease: str)
     for quad in QUADS:
         text += "f " + " ".join(f"{v + 1}/{v + 1}" for v in quad) + "\n"
     options = {"scheme": "catmull-clark", "uv": "smooth", "crease": crease, "levels": 3}
+    options["limit"] = False
     mesh = formats.read_polygons(made(text.encode(), "obj", "obj", **options).content, "obj")
     uv = mesh.layers[UV].values[mesh.layers[UV].rows]
     np.testing.assert_allclose(uv, mesh.vertices[mesh.corners][:, 1:], atol=1e-9)

@@ -154,14 +154,9 @@ export class SettingsForm {
     };
     // Each model has its own budget.
     if (target === select("model")) settings.budget = null;
-    // The service gives exact normals on the exact surface alone.
-    if (target === input("limit") && !settings.limit && settings.normals === "limit") settings.normals = "auto";
-    if (settings.normals === "limit") settings.limit = true;
     const isNew = ([name, value]: [string, unknown]) => value !== before[name as keyof Settings];
     Object.assign(this.wanted, Object.fromEntries(Object.entries(settings).filter(isNew)));
     this.settings = settings;
-    input("limit").checked = settings.limit;
-    select("normals").value = settings.normals;
     this.adjust();
     this.changed();
   }

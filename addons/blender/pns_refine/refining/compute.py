@@ -45,7 +45,7 @@ class Choice:
     model: Model | None
     levels: int
     budget: float | None = None
-    limit: bool = False
+    limit: bool = True
     crease_angle: float | None = None
     crease_lines: bool = True
     border: str = "smooth"

@@ -135,7 +135,7 @@ class _Counter:
         length: float,
         creases: Creases,
     ) -> Refinement:
-        made = refine(mesh, scheme, 1, length, creases=creases, progress=self._tell)
+        made = refine(mesh, scheme, 1, length, limit=False, creases=creases, progress=self._tell)
         self._done += made.mesh.face_count
         return made
 

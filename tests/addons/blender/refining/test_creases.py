@@ -12,7 +12,7 @@ from addons.blender.pns_refine.refining.steps import (
     level_steps,
     refine_columns,
 )
-from pns_common import Creases, Mesh, catmull_clark, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, catmull_clark, load_model, loop, pns
 from pns_common.columns import level_topologies
 from pns_common.columns import refine_columns as refine_by_library
 from pns_common.model.file import DEFAULT_MODEL
@@ -20,6 +20,7 @@ from pns_common.schemes import CATMULL_CLARK, LOOP
 from pns_common.sharpness import creases_by_name
 from pns_common.topology import build_topology
 from tests.addons.blender.quads import cube, cut, grid
+from tests.support.control_points import refine
 
 
 def points(snapshot, levels=1, **choice):
