@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
+from math import inf, pi
 from types import MappingProxyType
 
 import numpy as np
@@ -205,6 +205,31 @@ _FACE = FeatureGroup(
     ),
 )
 
+
+def _vectors(kind: str, vertices: str) -> tuple[Feature, ...]:
+    """Return the coordinates along T, N and B of a vector at each of some vertices."""
+    return tuple(
+        Feature(f"{kind} {axis}", vertex, mirror=-1 if axis == "B" else 1, limit=limit)
+        for vertex in vertices
+        for axis in "TNB"
+        for limit in (1.0 if kind == "normal" else 3.0,)
+    )
+
+
+# Of a directed edge a → b, c to its left: `kernels.directed` writes them.
+_DIRECTED = (
+    Feature("turn", limit=pi),
+    Feature("tanh turn / 0.3"),
+    Feature("tanh turn / 0.1"),
+    *_vectors("opposite", "cd"),
+    *_vectors("normal", "ab"),
+    *_vectors("umbrella", "ab"),
+    *(Feature("length over the mean", vertex, limit=3.0) for vertex in "ab"),
+    *(Feature("log valence / 6", vertex, limit=inf) for vertex in "ab"),
+    *(Feature("at a border", vertex) for vertex in "ab"),
+    Feature("is a border"),
+)
+
 # In the order of the numbers that `kernels.frames` knows them by.
 EDGE_GROUPS = (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA)
 
@@ -216,6 +241,7 @@ SIGNED_18 = FeatureSet(
 RING_10 = FeatureSet("ring-10", (_RING,), (RING_TURN_OVER,))
 
 FACE_8 = FeatureSet("face-8", (_FACE,), (RING_TURN_OVER,))
+DIRECTED_28 = FeatureSet("directed-28", (FeatureGroup("directed", _DIRECTED),), (MIRROR,))
 
 # Sets of edges, old vertices and faces, by the name on a model card.
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(

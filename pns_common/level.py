@@ -73,6 +73,11 @@ class Level:
             vars(made)["faces"] = self.faces
         return made
 
+    @cached_property
+    def unmarked(self) -> Level:
+        """The level without sharp edges and corners, as networks of directed edges see it."""
+        return self.with_topology(self.topology.without_creases())
+
     def measure(self, *, rings: bool) -> None:
         """Make the measurements that several threads are about to read."""
         _ = self.normals, self.logs

@@ -103,18 +103,20 @@ class _InUnits(nn.Module):
 
 
 class _TiedHidden(nn.Module):
-    """K (m, G n) as entries ((g, i), (h, j)): K_ij[g h]."""
+    """K (m, G n) as entries ((g, i), (h, j)): K_ij[g h]; side by side for several layers read."""
 
     product: Tensor
 
-    def __init__(self, size: int):
+    def __init__(self, size: int, inputs: int = 1):
         super().__init__()
+        self.inputs = inputs
         self.register_buffer("product", torch.from_numpy(product(size)), persistent=False)
 
     def forward(self, free: Float[Tensor, "m Gn"]) -> Float[Tensor, "Gm Gn"]:
         size = len(self.product)
-        blocks = free.reshape(len(free), size, -1)[:, self.product]  # (m, G, G, n)
-        return blocks.transpose(0, 1).reshape(size * len(free), -1)
+        blocks = free.reshape(len(free), self.inputs, size, -1)[:, :, self.product]
+        # (m, inputs, G, G, n), of which the first G numbers rows.
+        return blocks.permute(2, 0, 1, 3, 4).reshape(size * len(free), -1)
 
     def right_inverse(self, dense: Float[Tensor, "Gm Gn"]) -> Float[Tensor, "m Gn"]:
         return dense[: len(dense) // len(self.product)].clone()

@@ -1,0 +1,187 @@
+"""What a network of directed edges sees on a mesh, and what it answers there.
+
+Each edge is two directed edges, a → b and b → a, with a state each. After r rounds a state depends
+on what lies within r + 1 rings of the edge, and on nothing else. Features are in the edge's own
+frame and in units of its length; sums around vertices are taken in double precision. Edges that a
+user marks as sharp are seen as if they were not marked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float, Float32, Integer
+
+from pns_common.errors import ModelError
+from pns_common.kernels import directed as kernels
+from pns_common.level import Level
+
+# Edges of one call of a network, both ways: a chunk of rows.
+EDGES_AT_ONCE = 2048
+
+# Rows (N, K) → rows (N, A).
+Network = Callable[[Float[np.ndarray, "N K"]], Float[np.ndarray, "N A"]]
+
+
+@dataclass(frozen=True)
+class DirectedNetworks:
+    """The networks of a model of directed edges.
+
+    Attributes:
+        encoder: features → states, (N, W).
+        rounds: messages (N, 6 W) → what is added to states.
+        heads: states → answers, (N, 8): z, y, two logits; (N, 9) with a height for faces.
+        width: W.
+        answers: 8 or 9.
+    """
+
+    encoder: Network
+    rounds: tuple[Network, ...]
+    heads: Network
+    width: int
+    answers: int = kernels.FACE
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What the network says of a mesh, in world axes and in units of h.
+
+    Attributes:
+        edges, vertices: (E, 3), (V, 3): F z, where the vertex is asked to go from flat.
+        faces: (F,) along the normals; (0,) where no head is for them.
+        sharpness, corners: (E,), (V,) the sigmoids of the logits.
+    """
+
+    edges: Float[np.ndarray, "E 3"]
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Float[np.ndarray, " F"]
+    sharpness: Float[np.ndarray, " E"]
+    corners: Float[np.ndarray, " V"]
+
+
+def directed_features(level: Level, begin: int, end: int) -> Float32[np.ndarray, "D 28"]:
+    """Return the features of edges begin … end − 1: first all a → b, then all b → a.
+
+    ``level`` must have no marks: ``level.unmarked``.
+    """
+    mesh, rings = level.topology, level.rings
+    made = np.empty((2 * (end - begin), kernels.FEATURES), dtype=np.float32)
+    kernels.directed_features(
+        level.points,
+        level.normals,
+        rings.fields,
+        rings.means,
+        rings.valence,
+        on_border(level),
+        mesh.corners,
+        mesh.offsets,
+        mesh.face_of_corner,
+        mesh.edges,
+        mesh.half_edges,
+        mesh.edge_class,
+        begin,
+        end,
+        made,
+    )
+    return made
+
+
+def on_border(level: Level) -> np.ndarray:
+    """Return which vertices end an edge that is not between two faces."""
+    counts = level.topology.sharp_count
+    return counts > 0 if len(counts) else np.zeros(len(level.points), dtype=bool)
+
+
+def ask(level: Level, networks: DirectedNetworks) -> Answers:
+    """Run the networks over a mesh without marks.
+
+    Raises:
+        ModelError: an answer is not finite, or has another shape.
+    """
+    mesh, width = level.topology, networks.width
+    edges, count = mesh.edges, len(mesh.edges)
+    level.measure(rings=True)
+    blocks = level.blocks.of_rows(EDGES_AT_ONCE)
+    starts = np.concatenate([[0], np.cumsum(mesh.valence)]).astype(np.int64)
+    leaving = np.empty(2 * count, dtype=np.uint32)
+    kernels.find_leaving(edges, starts[:-1].copy(), leaving)
+    states = np.empty((2 * count, width), dtype=np.float32)
+    pooled = np.empty((mesh.vertex_count, 2 * width), dtype=np.float32)
+
+    def both(begin: int, end: int) -> tuple[slice, slice]:
+        return slice(begin, end), slice(count + begin, count + end)
+
+    def encode(begin: int, end: int) -> None:
+        rows = checked(networks.encoder, directed_features(level, begin, end), width)
+        there, back = both(begin, end)
+        states[there], states[back] = rows[: end - begin], rows[end - begin :]
+
+    def hear(update: Network, begin: int, end: int) -> None:
+        messages = np.empty((2 * (end - begin), 6 * width), dtype=np.float32)
+        kernels.gather(states, pooled, edges, begin, end, messages)
+        more, (there, back) = checked(update, messages, width), both(begin, end)
+        # Both ways of an edge stand in one block: nobody else reads these rows any more.
+        states[there] += more[: end - begin]
+        states[back] += more[end - begin :]
+
+    asked, of_leaving = np.empty((count, 3)), np.empty((2 * count, 3))
+    logits, corner_logits = np.empty(count), np.empty(2 * count)
+    heights = np.empty(2 * count if networks.answers > kernels.FACE else 0)
+    geometry = level.points, level.normals, level.rings.fields, mesh.corners, mesh.face_of_corner
+    of_edges = edges, mesh.half_edges, mesh.edge_class
+
+    def answer(begin: int, end: int) -> None:
+        there, back = both(begin, end)
+        rows = np.concatenate([states[there], states[back]])
+        heads = checked(networks.heads, rows, networks.answers).astype(np.float64)
+        kernels.read_heads(*geometry, *of_edges, heads, begin, end, asked, of_leaving, logits)
+        for own, column in (corner_logits, kernels.CORNER), (heights, kernels.FACE):
+            if len(own):
+                own[there], own[back] = np.split(heads[:, column], 2)
+
+    blocks.run(count, encode)
+    for update in networks.rounds:
+        level.blocks.quiet().run(
+            mesh.vertex_count,
+            lambda begin, end: kernels.pool(states, starts, leaving, begin, end, pooled),
+        )
+        blocks.run(count, partial(hear, update))
+    blocks.run(count, answer)
+    of_vertices, vertex_logits = np.empty(level.points.shape), np.empty(mesh.vertex_count)
+    read = of_leaving, corner_logits, starts, leaving
+    level.blocks.quiet().run(
+        mesh.vertex_count,
+        lambda begin, end: kernels.mean_leaving(*read, begin, end, of_vertices, vertex_logits),
+    )
+    faces = np.empty(mesh.face_count if len(heights) else 0)
+    around = heights, mesh.corners, mesh.offsets, mesh.corner_edges, edges
+    level.blocks.quiet().run(
+        len(faces), lambda begin, end: kernels.mean_in_faces(*around, begin, end, faces)
+    )
+    return Answers(asked, of_vertices, faces, _sigmoid(logits), _sigmoid(vertex_logits))
+
+
+def checked(network: Network, rows: Float[np.ndarray, "N K"], columns: int) -> np.ndarray:
+    """Return a network's answers.
+
+    Raises:
+        ModelError: an answer is not finite, or has another shape.
+    """
+    made = np.asarray(network(rows))
+    if made.dtype.kind not in "fiub":
+        raise ModelError("network", expected="real numbers", found=f"{made.dtype}")
+    if made.shape != (len(rows), columns):
+        expected = f"shape ({len(rows)}, {columns})"
+        raise ModelError("network", expected=expected, found=f"{made.shape}")
+    if not np.isfinite(made).all():
+        raise ModelError("network", expected="finite answers", found="NaN or infinity")
+    return made
+
+
+def _sigmoid(logits: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """Return 1 / (1 + exp −x), for large x of either sign too."""
+    shrunk = np.exp(-np.abs(logits))
+    return np.where(logits >= 0, 1.0, shrunk) / (1 + shrunk)

@@ -1,0 +1,306 @@
+"""Directed edges: their features and frames, what they say to each other, and what they answer.
+
+Edge e joins a < b. It stands for two directed edges: number e runs a → b, number E + e runs b → a.
+Each has a frame T (along it), N (the mean of both faces' normals, at right angles to T) and
+B = N × T; turned round, T and B change their signs. What a missing face would say is 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pns_common.kernels import inlined, kernel
+from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, previous_corner
+from pns_common.kernels.frames import wing
+from pns_common.kernels.measures import LENGTH
+from pns_common.kernels.vectors import across, cross, difference, divisor, dot, norm, over, row
+
+# Columns of `directed-28`, and of what a directed edge answers: z, y, two logits, a height.
+FEATURES = 28
+EDGE, VERTEX, SHARPNESS, CORNER, FACE = 0, 3, 6, 7, 8
+# Below this length the sum of two normals has no direction: the ends' normals take its place.
+NO_MEAN = 1e-3
+# Turns, in radians, at which features of the turn saturate; and lengths, in edges.
+TURNS, REACH = (0.3, 0.1), 3.0
+
+
+@inlined
+def sides_of(e, corners, edges, half_edges, edge_class):
+    """Return the half-edges of e in the faces left and right of a → b; −1 for none."""
+    left, right = -1, -1
+    if edge_class[e] != IRREGULAR:
+        for side in range(2):
+            h = half_edges[e, side]
+            if h >= 0:
+                if corners[h] == edges[e, 0]:
+                    left = h
+                else:
+                    right = h
+    return left, right
+
+
+@inlined
+def normal_of(normals, h, face_of_corner):
+    """Return the unit normal of the face of a half-edge; 0 without one."""
+    if h < 0:
+        return 0.0, 0.0, 0.0
+    return row(normals, face_of(h, face_of_corner))
+
+
+@inlined
+def sum_of(u, v):
+    """Return u + v."""
+    return u[0] + v[0], u[1] + v[1], u[2] + v[2]
+
+
+@inlined
+def directed_frame(a, b, n, m, at_a, at_b):
+    """Return T, N, B and h of a → b; n, m are the faces' normals, at_a and at_b the ends'."""
+    spoke = difference(b, a)
+    h = norm(spoke)
+    t = over(spoke, divisor(spoke))
+    up = across(sum_of(n, m), t)
+    if norm(up) <= NO_MEAN:
+        up = across(sum_of(at_a, at_b), t)
+        if norm(up) <= NO_MEAN:
+            up = 0.0, 0.0, 0.0
+    up = over(up, divisor(up))
+    return t, up, cross(up, t), h
+
+
+@inlined
+def _soft(x):
+    return REACH * math.tanh(x / REACH)
+
+
+@inlined
+def _write(features, to, column, x, y, z):
+    features[to, column], features[to, column + 1], features[to, column + 2] = x, y, z
+
+
+@inlined
+def _opposite(points, h, corners, offsets, face_of_corner):
+    """Return the mean of a face's corners off a half-edge."""
+    if len(face_of_corner):
+        c = wing(points, h, corners, offsets, face_of_corner)
+        return c[0], c[1], c[2]
+    return row(points, corners[previous_corner(h)])
+
+
+@kernel
+def directed_features(
+    points,
+    normals,
+    fields,
+    means,
+    valence,
+    on_border,
+    corners,
+    offsets,
+    face_of_corner,
+    edges,
+    half_edges,
+    edge_class,
+    begin,
+    end,
+    features,
+):
+    """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
+
+    Args:
+        fields, means, valence: of the rings, ``kernels.measures``.
+        on_border: (V,) whether a vertex ends an edge that is not interior.
+        features: (2 (end − begin), 28) out.
+    """
+    count = end - begin
+    for e in range(max(begin, 0), end):
+        there, back = e - begin, count + e - begin
+        a, b = edges[e, 0], edges[e, 1]
+        left, right = sides_of(e, corners, edges, half_edges, edge_class)
+        n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
+        p, q, at_a, at_b = row(points, a), row(points, b), row(fields, a), row(fields, b)
+        t, up, side, h = directed_frame(p, q, n, m, at_a, at_b)
+        size = h if h > 0 else 1.0
+        middle = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2
+        c, d = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if left >= 0:
+            to = difference(_opposite(points, left, corners, offsets, face_of_corner), middle)
+            c = dot(to, t) / size, dot(to, up) / size, dot(to, side) / size
+        if right >= 0:
+            to = difference(_opposite(points, right, corners, offsets, face_of_corner), middle)
+            d = dot(to, t) / size, dot(to, up) / size, dot(to, side) / size
+        turn = 0.0
+        if left >= 0 and right >= 0 and dot(n, n) > 0 and dot(m, m) > 0:
+            turn = 2 * math.atan2(norm(difference(n, m)), norm(sum_of(n, m)))
+            if c[1] + d[1] > 0:
+                turn = -turn
+        ca, cb = row(means, a), row(means, b)
+        border = 1.0 if edge_class[e] != INTERIOR else 0.0
+        for way in range(2):
+            to = there if way == 0 else back
+            # The other way round T and B change their signs.
+            s = 1.0 - 2.0 * way
+            here, far = (c, d) if way == 0 else (d, c)
+            v, w = (a, b) if way == 0 else (b, a)
+            m1, m2 = (at_a, at_b) if way == 0 else (at_b, at_a)
+            u1, u2 = (ca, cb) if way == 0 else (cb, ca)
+            _write(features, to, 0, turn, math.tanh(turn / TURNS[0]), math.tanh(turn / TURNS[1]))
+            _write(features, to, 3, _soft(s * here[0]), _soft(here[1]), _soft(s * here[2]))
+            _write(features, to, 6, _soft(s * far[0]), _soft(far[1]), _soft(s * far[2]))
+            _write(features, to, 9, s * dot(m1, t), dot(m1, up), s * dot(m1, side))
+            _write(features, to, 12, s * dot(m2, t), dot(m2, up), s * dot(m2, side))
+            x, y, z = dot(u1, t) / size, dot(u1, up) / size, dot(u1, side) / size
+            _write(features, to, 15, _soft(s * x), _soft(y), _soft(s * z))
+            x, y, z = dot(u2, t) / size, dot(u2, up) / size, dot(u2, side) / size
+            _write(features, to, 18, _soft(s * x), _soft(y), _soft(s * z))
+            features[to, 21] = _length_ratio(h, means[v, LENGTH])
+            features[to, 22] = _length_ratio(h, means[w, LENGTH])
+            features[to, 23] = math.log(max(valence[v], 1) / 6.0)
+            features[to, 24] = math.log(max(valence[w], 1) / 6.0)
+            features[to, 25] = 1.0 if on_border[v] else 0.0
+            features[to, 26] = 1.0 if on_border[w] else 0.0
+            features[to, 27] = border
+
+
+@inlined
+def _length_ratio(h, mean):
+    return _soft(math.log(h / mean)) if h > 0 and mean > 0 else 0.0
+
+
+@kernel
+def pool(states, starts, spokes, begin, end, pooled):
+    """Write mean and largest state of the directed edges that leave vertices begin … end − 1.
+
+    Args:
+        states: (2 E, W).
+        starts, spokes: where the directed edges that leave each vertex begin, and these.
+        pooled: (V, 2 W) out; 0 at vertices without edges.
+    """
+    width = states.shape[1]
+    for v in range(max(begin, 0), end):
+        first, stop = starts[v], starts[v + 1]
+        for k in range(width):
+            total, largest = 0.0, -math.inf
+            for i in range(first, stop):
+                x = states[spokes[i], k]
+                total += x
+                largest = max(largest, x)
+            pooled[v, k] = total / (stop - first) if stop > first else 0.0
+            pooled[v, width + k] = largest if stop > first else 0.0
+
+
+@kernel
+def gather(states, pooled, edges, begin, end, messages):
+    """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
+
+    A row of ``messages``, (2 (end − begin), 6 W), is the edge's own state, that of the reverse
+    edge, and what is pooled at its first and at its second vertex.
+    """
+    width, count, edge_count = states.shape[1], end - begin, edges.shape[0]
+    for e in range(max(begin, 0), end):
+        a, b = edges[e, 0], edges[e, 1]
+        i, j = e - begin, count + e - begin
+        for k in range(width):
+            there, back = states[e, k], states[edge_count + e, k]
+            messages[i, k], messages[i, width + k] = there, back
+            messages[j, k], messages[j, width + k] = back, there
+        for k in range(2 * width):
+            at_a, at_b = pooled[a, k], pooled[b, k]
+            messages[i, 2 * width + k], messages[i, 4 * width + k] = at_a, at_b
+            messages[j, 2 * width + k], messages[j, 4 * width + k] = at_b, at_a
+
+
+@kernel
+def read_heads(
+    points,
+    normals,
+    fields,
+    corners,
+    face_of_corner,
+    edges,
+    half_edges,
+    edge_class,
+    heads,
+    begin,
+    end,
+    asked,
+    leaving,
+    logits,
+):
+    """Write what edges begin … end − 1 answer, out of their frames.
+
+    Args:
+        heads: (2 (end − begin), A): all a → b, then all b → a.
+        asked: (E, 3) out: the mean of F z over both directions.
+        leaving: (2 E, 3) out: F y.
+        logits: (E,) out: the mean of both logits of sharpness.
+    """
+    count, edge_count = end - begin, edges.shape[0]
+    for e in range(max(begin, 0), end):
+        i, j = e - begin, count + e - begin
+        a, b = edges[e, 0], edges[e, 1]
+        left, right = sides_of(e, corners, edges, half_edges, edge_class)
+        n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
+        t, up, side, _ = directed_frame(
+            row(points, a), row(points, b), n, m, row(fields, a), row(fields, b)
+        )
+        for k in range(3):
+            z = (heads[i, EDGE] - heads[j, EDGE]) * t[k]
+            z += (heads[i, EDGE + 1] + heads[j, EDGE + 1]) * up[k]
+            z += (heads[i, EDGE + 2] - heads[j, EDGE + 2]) * side[k]
+            asked[e, k] = z / 2
+            y = heads[i, VERTEX] * t[k] + heads[i, VERTEX + 1] * up[k]
+            leaving[e, k] = y + heads[i, VERTEX + 2] * side[k]
+            y = heads[j, VERTEX + 1] * up[k] - heads[j, VERTEX] * t[k]
+            leaving[edge_count + e, k] = y - heads[j, VERTEX + 2] * side[k]
+        logits[e] = (heads[i, SHARPNESS] + heads[j, SHARPNESS]) / 2
+
+
+@kernel
+def mean_leaving(leaving, corner_logits, starts, spokes, begin, end, asked, logits):
+    """Write means over the directed edges that leave vertices begin … end − 1.
+
+    Args:
+        leaving: (2 E, 3); corner_logits: (2 E,).
+        asked: (V, 3) out; logits: (V,) out, 0 at vertices without edges.
+    """
+    for v in range(max(begin, 0), end):
+        first, stop = starts[v], starts[v + 1]
+        x, y, z, logit = 0.0, 0.0, 0.0, 0.0
+        for i in range(first, stop):
+            s = spokes[i]
+            x += leaving[s, 0]
+            y += leaving[s, 1]
+            z += leaving[s, 2]
+            logit += corner_logits[s]
+        count = max(stop - first, 1)
+        asked[v, 0], asked[v, 1], asked[v, 2] = x / count, y / count, z / count
+        logits[v] = logit / count
+
+
+@kernel
+def mean_in_faces(heights, corners, offsets, corner_edges, edges, begin, end, asked):
+    """Write the mean of ``heights`` (2 E,) over the directed edges around faces begin … end − 1."""
+    edge_count = edges.shape[0]
+    for f in range(max(begin, 0), end):
+        total = 0.0
+        for h in range(offsets[f], offsets[f + 1]):
+            e = corner_edges[h]
+            total += heights[e] if edges[e, 0] == corners[h] else heights[edge_count + e]
+        asked[f] = total / (offsets[f + 1] - offsets[f])
+
+
+@kernel
+def find_leaving(edges, stops, spokes):
+    """Write the directed edges that leave vertex 0, 1, …, one after another.
+
+    Args:
+        stops: (V,) where those of each vertex begin; on return, where they end.
+        spokes: (2 E,) out.
+    """
+    count = edges.shape[0]
+    for e in range(count):
+        for side in range(2):
+            v = edges[e, side]
+            spokes[stops[v]] = e + side * count
+            stops[v] += 1
