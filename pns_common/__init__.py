@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from pns_common.schemes import Scheme, catmull_clark, loop, pns
     from pns_common.sharpness import sharp_edges
     from pns_common.version import VERSION as __version__  # noqa: N811
-    from pns_common.warming import warm_up
 
 _HOMES = {
     "Creases": "creases",
@@ -55,7 +54,6 @@ _HOMES = {
     "refine_many": "refinement",
     "sharp_edges": "sharpness",
     "subdivide": "interop.subdivide",
-    "warm_up": "warming",
 }
 
 __all__ = [
@@ -77,7 +75,6 @@ __all__ = [
     "refine_many",
     "sharp_edges",
     "subdivide",
-    "warm_up",
 ]
 
 
