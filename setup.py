@@ -12,6 +12,7 @@ from pathlib import Path
 
 from setuptools import Extension, find_namespace_packages, find_packages, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.modified import newer_group
 
 KERNELS = Path("pns_common/kernels")
 
@@ -23,6 +24,10 @@ class BuildLoops(build_ext):
         """Build the one extension; without a C compiler it is left out, with a warning."""
         import numpy as np
 
+        sources = map(str, [*KERNELS.glob("*.py"), *KERNELS.glob("*.c")])
+        if not newer_group(sources, self.get_ext_fullpath(ext.name), missing="newer"):
+            return
+        self.force = True
         folder = Path(self.build_temp) / "loops"
         command = [sys.executable, "-P", KERNELS / "ahead.py", folder]
         subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": str(Path.cwd())})

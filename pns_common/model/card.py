@@ -14,7 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
+from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"

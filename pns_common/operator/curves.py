@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import connectivity
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
 
 # f falls from 1 where a curve turns by 60 degrees to 0 at 90.
 BEND, CORNER = 1 / 2, 1.0
