@@ -27,7 +27,7 @@ print(bool(kernels.AHEAD), digest.hexdigest())
 
 
 def test_this_checkout_runs_what_was_compiled_of_its_sources():
-    assert kernels.AHEAD, "make kernels"
+    assert kernels.AHEAD, "run `make kernels`"
 
 
 def test_numba_gives_the_same_bits():
