@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pns_common.kernels import (
     b1_1d,
     f4_2d,
@@ -224,6 +222,7 @@ def pool(
     spokes: u4_1d,
     begin: int,
     end: int,
+    total: f8_1d,
     pooled: f4_2d,
 ):
     """Write mean and largest state of the directed edges that leave vertices begin … end − 1.
@@ -231,10 +230,10 @@ def pool(
     Args:
         states: (2 E, W).
         starts, spokes: where the directed edges that leave each vertex begin, and these.
+        total: (W,) for sums.
         pooled: (V, 2 W) out; 0 at vertices without edges.
     """
     width = states.shape[1]
-    total = np.empty(width)
     for v in range(max(begin, 0), end):
         first, stop = starts[v], starts[v + 1]
         for k in range(width):

@@ -171,7 +171,9 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     for update in networks.rounds:
         level.blocks.quiet().run(
             mesh.vertex_count,
-            lambda begin, end: kernels.pool(states, starts, leaving, begin, end, pooled),
+            lambda begin, end: kernels.pool(
+                states, starts, leaving, begin, end, np.empty(width), pooled
+            ),
         )
         blocks.run(count, partial(hear, update))
     blocks.run(count, answer)
