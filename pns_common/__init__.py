@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pns_common.creases import Creases
+    from pns_common.cutting import cut_concave
     from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
     from pns_common.interop.subdivide import subdivide
     from pns_common.mesh import Mesh, clean
@@ -48,6 +49,7 @@ _HOMES = {
     "Scheme": "schemes",
     "catmull_clark": "schemes",
     "clean": "mesh",
+    "cut_concave": "cutting",
     "load_model": "model.file",
     "loop": "schemes",
     "pns": "schemes",
@@ -70,6 +72,7 @@ __all__ = [
     "__version__",
     "catmull_clark",
     "clean",
+    "cut_concave",
     "load_model",
     "loop",
     "pns",

@@ -96,7 +96,7 @@ def test_the_library_asks_for_five_packages(wheel, tmp_path):
     text = zipfile.ZipFile(wheel).read(metadata).decode()
     asked = [line for line in text.splitlines() if line.startswith("Requires-Dist")]
     base = sorted(line.split()[1].partition(">")[0] for line in asked if "extra ==" not in line)
-    assert base == ["jaxtyping", "numba", "numpy", "onnx", "onnxruntime"]
+    assert base == ["jaxtyping", "mapbox_earcut", "numba", "numpy", "onnx", "onnxruntime"]
 
 
 def test_readmes_python_prints_what_readme_says(tmp_path):

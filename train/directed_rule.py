@@ -8,19 +8,18 @@ number e runs from its lower vertex a to b, number E + e runs back.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
-from train.connectivity import Connectivity, next_corner
+from train.connectivity import next_corner
 from train.models.directed import Directed
 from train.reference import Surroundings
-from train.tensors import dot, ratio, root, unit
+from train.tensors import dot, root, unit
 
 # Below this length the sum of two unit normals has no direction.
 NO_MEAN = 1e-3

@@ -3,8 +3,8 @@
 python -m addons.blender.build PYTHON                       # PYTHON has bpy (`make addon`)
 python -m addons.blender.build PYTHON windows-x64           # for another platform
 
-The wheels of numba, llvmlite and onnxruntime are built for one platform and one version of Python:
-that of PYTHON, which is Blender's own.
+The wheels of mapbox_earcut, numba, llvmlite and onnxruntime are built for one platform and one
+version of Python: that of PYTHON, which is Blender's own.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SOURCE = Path(__file__).with_name("pns_refine")
 CORE = Path(__file__).with_name("core.toml")
 DIST = ROOT / "dist"
 # What the library imports, and Blender does not have; pinned by constraints.txt.
-REQUIRED = ("jaxtyping", "wadler-lindig", "numba", "llvmlite", "onnxruntime")
+REQUIRED = ("jaxtyping", "wadler-lindig", "mapbox_earcut", "numba", "llvmlite", "onnxruntime")
 # Blender's names of platforms, and those of wheels.
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),

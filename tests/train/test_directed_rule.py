@@ -9,7 +9,7 @@ from pns_common.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
 from pns_common.topology import build_topology
-from tests.train.test_reference import CLOSE, SEEDS, random_mesh
+from tests.train.test_reference import SEEDS, random_mesh
 from train.connectivity import connect
 from train.directed_rule import DirectedEdges
 from train.models.directed import DirectedNet
