@@ -4,23 +4,32 @@ import numpy as np
 import pytest
 import torch
 
+from pns_common import Creases, Scheme, operator
 from pns_common.directed import DirectedNetworks, ask, directed_features
 from pns_common.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
+from pns_common.sharpness import with_sharp_edges
 from pns_common.topology import build_topology
 from tests.train.test_reference import SEEDS, random_mesh
 from train.connectivity import connect
-from train.directed_rule import DirectedEdges
+from train.directed_rule import DirectedEdges, DirectedRule
 from train.models.directed import DirectedNet
 from train.reference import Surroundings
+
+
+def level_of(points, faces, creases):
+    """Return the library's level of a mesh."""
+    topology = build_topology(faces, len(points))
+    topology = topology.with_creases(topology.rows_of(creases))
+    return Level(points, topology, LOOP, 1.0, Blocks())
 
 
 @pytest.fixture(params=SEEDS)
 def both(request):
     """Return a random mesh as the library's level and as the reference's edges."""
-    points, faces, _ = random_mesh(request.param)
-    level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
+    points, faces, creases = random_mesh(request.param)
+    level = level_of(points, faces, creases[:0])
     edges = DirectedEdges(Surroundings(connect(faces, len(points)), torch.tensor(points)))
     return request.param, level, edges
 
@@ -65,3 +74,33 @@ def test_answers_agree(both):
     np.testing.assert_allclose(sharpness, made.sharpness, rtol=1e-4, atol=1e-4)
     corners = torch.sigmoid(edges.mean_leaving(heads[:, 7:8]))[:, 0]
     np.testing.assert_allclose(corners, made.corners, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("budget", [0.1, 10.0])
+@pytest.mark.parametrize("creased", [False, True])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_step_agrees(seed, creased, budget):
+    """x, s and the ratio, of networks that ask for more than the budget and than none."""
+    points, faces, creases = random_mesh(seed)
+    creases = creases if creased else creases[:0]
+    net, numbers = (
+        network(seed, 0.3),
+        {
+            "gate_sharpness": 1e3,
+            "vertex_gate_sharpness": 1e2,
+            "budget": budget,
+            "curve_strength": 0.7,
+            "network_scale": 0.4,
+            "fold_angle": 40.0,
+        },
+    )
+    rule = operator.DirectedRule(as_networks(net), **numbers)
+    scheme = Scheme("pns", LOOP, rule, learned_levels=1)
+    level = with_sharp_edges(level_of(points, faces, creases), Creases(learned=True), scheme)
+    made = operator.directed_level(level, rule)
+    mesh = connect(faces, len(points), creases)
+    step = DirectedRule(net, **numbers)(torch.tensor(points), mesh)
+    np.testing.assert_allclose(step.base, made.points - made.displacement, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(step.points, made.points, rtol=0, atol=1e-4)
+    np.testing.assert_array_equal(step.scale, made.scale)
+    np.testing.assert_allclose(step.ratio, made.ratio, rtol=0, atol=1e-4)
