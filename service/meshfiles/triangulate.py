@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.cutting import BLOCK, Cut, convex_pieces, cut_polygons, newell
+from pns_common.mesh.cutting import BLOCK, Cut, convex_pieces, cut_polygons, newell
 
 from ..report import Change
 from .mesh_file import MeshFile, offsets_of
@@ -32,7 +32,7 @@ def triangulated(mesh: MeshFile) -> MeshFile:
 
 
 def in_star_shaped_pieces(mesh: MeshFile) -> MeshFile:
-    """Return polygons with the concave ones in convex pieces; see ``pns_common.cutting``."""
+    """Return polygons with the concave ones in convex pieces; see ``pns_common.mesh.cutting``."""
     pieces = convex_pieces(mesh.vertices, mesh.offsets, mesh.corners)
     told = {
         "concave polygons cut into convex pieces": pieces.cut,

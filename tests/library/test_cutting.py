@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, catmull_clark, cut_concave, refine
-from pns_common.cutting import are_star_shaped, convex_pieces
+from pns_common.mesh.cutting import are_star_shaped, convex_pieces
 from tests.support.meshes import rotation
 from tests.support.polygons import SHAPES
 

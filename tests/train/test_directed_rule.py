@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import torch
 
-from pns_common import Creases, Scheme, operator
-from pns_common.directed import DirectedNetworks, ask, directed_features
-from pns_common.level import Level
+from pns_common import Creases, Scheme
+from pns_common.mesh.topology import build_topology
+from pns_common.operator import formula
+from pns_common.operator.directed import DirectedNetworks, ask, directed_features
+from pns_common.operator.level import Level
+from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
-from pns_common.sharpness import with_sharp_edges
-from pns_common.topology import build_topology
 from tests.train.test_reference import SEEDS, random_mesh
 from train.connectivity import connect
 from train.directed_rule import DirectedEdges, DirectedRule
@@ -94,10 +95,10 @@ def test_a_step_agrees(seed, creased, budget):
             "fold_angle": 40.0,
         },
     )
-    rule = operator.DirectedRule(as_networks(net), **numbers)
+    rule = formula.DirectedRule(as_networks(net), **numbers)
     scheme = Scheme("pns", LOOP, rule, learned_levels=1)
     level = with_sharp_edges(level_of(points, faces, creases), Creases(learned=True), scheme)
-    made = operator.directed_level(level, rule)
+    made = formula.directed_level(level, rule)
     mesh = connect(faces, len(points), creases)
     step = DirectedRule(net, **numbers)(torch.tensor(points), mesh)
     np.testing.assert_allclose(step.base, made.points - made.displacement, rtol=0, atol=1e-4)
