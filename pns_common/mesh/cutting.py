@@ -283,8 +283,11 @@ def _without_spikes(
 
 
 def _earcut(points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "t 3"] | None:
-    import mapbox_earcut
-
+    try:
+        import mapbox_earcut
+    except ImportError as error:
+        advice = "pip install 'pns-subdivision[polygons]'"
+        raise ImportError(f"cutting concave polygons needs mapbox_earcut: {advice}") from error
     if len(points) < 3:
         return None
     ends = np.array([len(points)], dtype=np.uint32)

@@ -1,5 +1,7 @@
 """Concave polygons become convex pieces of the same corners and area, which quads then tile."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -126,3 +128,10 @@ def test_the_size_of_a_polygon_does_not_matter(size):
     letter = polygon(LETTER_U)
     made = cut_concave(Mesh(size * letter.vertices, letter.faces))
     np.testing.assert_array_equal(made.corners, cut_concave(letter).corners)
+
+
+def test_what_cutting_needs_is_named_where_it_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mapbox_earcut", None)
+    with pytest.raises(ImportError, match=r"pip install 'pns-subdivision\[polygons\]'"):
+        cut_concave(polygon(LETTER_U))
+    assert cut_concave(Mesh(*SHAPES["cube"])).face_count == 6
