@@ -128,7 +128,7 @@ def directed_features(
     edge_class: i1_1d,
     begin: int,
     end: int,
-    features: f4_2d,
+    features: f4_2d | f8_2d,
 ):
     """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
 
@@ -217,13 +217,13 @@ def measure_sizes(
 
 @kernel
 def pool(
-    states: f4_2d,
+    states: f4_2d | f8_2d,
     starts: i8_1d,
     spokes: u4_1d,
     begin: int,
     end: int,
     total: f8_1d,
-    pooled: f4_2d,
+    pooled: f4_2d | f8_2d,
 ):
     """Write mean and largest state of the directed edges that leave vertices begin … end − 1.
 
@@ -249,12 +249,12 @@ def pool(
 
 @kernel
 def gather(
-    states: f4_2d,
-    pooled: f4_2d,
+    states: f4_2d | f8_2d,
+    pooled: f4_2d | f8_2d,
     edges: u4_2d,
     begin: int,
     end: int,
-    messages: f4_2d,
+    messages: f4_2d | f8_2d,
 ):
     """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
 
