@@ -99,10 +99,13 @@ def charts_of(
             edges = surface.corner_edges[chart.half_edges[:, 0]]
             inside = np.where(surface.edge_class == EdgeClass.IRREGULAR, 0.0, surface.sharpness)
             chart = chart.with_sharpness(inside[edges])
-        if len(surface.vertex_sharpness):
+        if surface.has_corners:
             vertex_of = np.zeros(chart.vertex_count, dtype=np.int64)
             vertex_of[chart.corners] = surface.corners
-            chart = chart.with_vertex_sharpness(surface.vertex_sharpness[vertex_of])
+            if len(surface.vertex_sharpness):
+                chart = chart.with_vertex_sharpness(surface.vertex_sharpness[vertex_of])
+            if len(surface.soft_corners):
+                chart = chart.with_soft_corners(surface.soft_corners[vertex_of])
         charts.append(chart)
     return charts
 
