@@ -88,7 +88,7 @@ class Topology:
     soft: Float[np.ndarray, " S"]
     vertex_sharpness: Float[np.ndarray, " K"]
     plain: bool
-    soft_corners: Float[np.ndarray, " C"] = field(default_factory=lambda: NO_WEIGHTS)
+    soft_corners: Float[np.ndarray, " Q"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -267,7 +267,7 @@ class Topology:
             weights = np.maximum(weights, self.soft_corners)
         return replace(self, soft_corners=weights if weights.any() else NO_WEIGHTS)
 
-    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " C"]:
+    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " Q"]:
         """Return ``soft_corners`` a level later, where there are ``count`` vertices."""
         if len(self.soft_corners) == 0:
             return NO_WEIGHTS
