@@ -88,7 +88,7 @@ class Topology:
     soft: Float[np.ndarray, " S"]
     vertex_sharpness: Float[np.ndarray, " K"]
     plain: bool
-    soft_corners: Float[np.ndarray, " Q"] = field(default_factory=lambda: NO_WEIGHTS)
+    soft_corners: Float[np.ndarray, " SV"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -262,12 +262,17 @@ class Topology:
         return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
 
     def with_soft_corners(self, weights: Float[np.ndarray, " V"]) -> Topology:
-        """Return a copy with learned corner weights, where they are less."""
+        """Return a copy with learned corner weights, where they are less.
+
+        Vertices of weight 1 are corners for good.
+        """
+        made = self.with_vertex_sharpness(np.where(weights >= 1, np.inf, 0.0))
+        weights = np.where(weights >= 1, 0.0, weights)
         if len(self.soft_corners):
             weights = np.maximum(weights, self.soft_corners)
-        return replace(self, soft_corners=weights if weights.any() else NO_WEIGHTS)
+        return replace(made, soft_corners=weights if weights.any() else NO_WEIGHTS)
 
-    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " Q"]:
+    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " SV"]:
         """Return ``soft_corners`` a level later, where there are ``count`` vertices."""
         if len(self.soft_corners) == 0:
             return NO_WEIGHTS

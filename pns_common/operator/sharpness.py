@@ -217,7 +217,7 @@ def shares_of_corners(level: Level, rule: DirectedRule) -> Float[np.ndarray, " V
     mesh = seen.topology
     smooth = np.zeros(len(mesh.edges))
     gate, _, _ = directed_gates(mesh, seen.edges.jumps, smooth, rule)
-    shares = clearly(gate * answers.corners)
+    shares = np.minimum(clearly(gate * answers.corners), SHARPEST)
     counts = mesh.sharp_count
     if len(counts):
         shares[counts > 0] = 0.0
@@ -239,11 +239,14 @@ def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
         ModelError: a network's answer is not finite, or has another shape.
     """
     level = Level(mesh.vertices, mesh.topology(), scheme.base, None, Blocks())
+    _ = level.unmarked  # where the networks' answers are kept
     topology = with_sharp_edges(level, creases, scheme).topology
     found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
     sharpness = topology.sharpness[found] if len(topology.soft) else None
     edges = topology.edges[found].astype(np.int64)
-    corners = topology.soft_corners if len(topology.soft_corners) else None
+    corners = None
+    if creases.learned and isinstance(scheme.rule, DirectedRule):
+        corners = shares_of_corners(level, scheme.rule)
     named = {"named": edges, "sharpness": sharpness, "soft_corners": corners}
     return replace(creases, angle=None, learned=False, **named)
 
