@@ -235,10 +235,10 @@ class Surroundings:
     """
 
     flat: Float[np.ndarray, "W 3"]
-    gates: tuple[Float[np.ndarray, " N"], ...]
-    bounds: tuple[Float[np.ndarray, " N"], ...]
-    lengths: tuple[Float[np.ndarray, " N"], ...]
-    rows: tuple[Integer[np.ndarray, " N"], ...]
+    gates: tuple[Float[np.ndarray, "_"], ...]
+    bounds: tuple[Float[np.ndarray, "_"], ...]
+    lengths: tuple[Float[np.ndarray, "_"], ...]
+    rows: tuple[Integer[np.ndarray, "_"], ...]
 
 
 def directed_level(level: Level, rule: DirectedRule) -> Additions:
@@ -313,7 +313,7 @@ def directed_gates(
     jumps: Float[np.ndarray, " E"],
     sharpness: Float[np.ndarray, " E"],
     rule: DirectedRule,
-) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+) -> tuple[Float[np.ndarray, " V"], Float[np.ndarray, " E"], Float[np.ndarray, " F"]]:
     """Return γ of vertices, edges and faces.
 
     γ_f = largest (1 − w) tanh(c_v x) over the face's edges; γ_v = largest γ_f around the vertex;

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, ModelError, catmull_clark, loop, pns
@@ -42,7 +42,6 @@ ROUNDING = 1 + 1e-12
 QUAD = np.array([[0, 1, 3], [1, 2, 0], [2, 3, 1], [3, 0, 2]])
 
 over_both = pytest.mark.parametrize("base", BASES)
-few = settings(max_examples=25, deadline=None)
 
 
 def once(mesh, scheme, **options):
@@ -55,7 +54,6 @@ def corner_triangles(faces):
 
 
 @over_both
-@few
 @given(data=st.data(), number=st.integers(0, 2), budget=st.floats(1e-2, 1e2))
 def test_displacement_within_budget(base, data, number, budget):
     """‖x − x0‖ ≤ C h² / R at every new vertex, from the output positions."""
@@ -76,7 +74,6 @@ def test_displacement_within_budget(base, data, number, budget):
 
 
 @over_both
-@few
 @given(data=st.data(), number=st.integers(0, 2), learned=st.booleans())
 def test_no_child_folds(base, data, number, learned):
     """Children stay within the card's angle of the base's, whose creases are the same."""
@@ -89,7 +86,6 @@ def test_no_child_folds(base, data, number, learned):
 
 
 @over_both
-@few
 @given(data=st.data(), seed=st.integers(0, 2**31))
 def test_commutes_with_rigid_motion(base, data, seed):
     mesh, scheme, rng = data.draw(MANIFOLDS[base]), pns(EXACT[base]), np.random.default_rng(seed)
@@ -100,7 +96,6 @@ def test_commutes_with_rigid_motion(base, data, seed):
 
 
 @over_both
-@few
 @given(data=st.data(), power=st.integers(-20, 20))
 def test_scaling_a_mesh_scales_the_result(base, data, power):
     mesh, scheme, scale = data.draw(MANIFOLDS[base]), pns(EXACT[base]), 2.0**power
@@ -110,7 +105,6 @@ def test_scaling_a_mesh_scales_the_result(base, data, power):
 
 
 @over_both
-@few
 @given(data=st.data(), seed=st.integers(0, 2**31))
 def test_renumbering_permutes_the_output(base, data, seed):
     """Other numbers, another order of faces, and another first corner of each."""
@@ -126,7 +120,6 @@ def test_renumbering_permutes_the_output(base, data, seed):
 
 
 @over_both
-@few
 @given(data=st.data())
 def test_a_mirrored_mesh_gives_the_mirrored_result(base, data):
     mesh, scheme, flip = data.draw(MANIFOLDS[base]), pns(EXACT[base]), np.array([-1.0, 1, 1])
@@ -158,7 +151,6 @@ def test_planes_give_the_base_scheme(base, number):
 
 
 @over_both
-@few
 @given(data=st.data(), number=st.integers(0, 2))
 def test_the_limit_surface_is_within_the_reported_distance(base, data, number):
     mesh, scheme = data.draw(MANIFOLDS[base]), pns(MODELS[base][number])
@@ -172,7 +164,6 @@ def test_the_limit_surface_is_within_the_reported_distance(base, data, number):
 
 
 @over_both
-@few
 @given(data=st.data(), number=st.integers(0, 2))
 def test_any_mesh_is_refined_and_reported(base, data, number):
     refined = refine(data.draw(ANY[base]), pns(MODELS[base][number]), 2)

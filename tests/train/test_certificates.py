@@ -7,8 +7,10 @@ import pytest
 import torch
 
 from pns_common import Mesh, MeshError, Scheme, load_model, loop, pns
+from pns_common.model.file import model_from_bytes
 from tests.support import schemes
 from tests.support.control_points import refine
+from tests.support.directed import directed_model, directed_model_bytes
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, one_way_pair, three_pages
 from tests.support.networks import default_model, huge_model, random_model
 from tests.support.shared import shared_path
@@ -20,17 +22,21 @@ from train.certificates.bodies import (
     real_bodies,
     synthetic_bodies,
 )
-from train.certificates.certify import scheme_steps
+from train.certificates.certify import run_steps, scheme_steps
 from train.certificates.displacement import bounded_displacement
+from train.certificates.double_precision import double_model
 from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
     fold_free,
     largest_turn,
     limit_distance,
+    locality,
     neighbour_turns,
+    numbering,
     resolution_independence,
     smoothness_class,
 )
+from train.certificates.model_file import keeps_its_word
 from train.certificates.plain import plain_loop
 from train.certificates.planar_spectrum import lifted_stars, planar_spectrum
 from train.certificates.scaling import (
@@ -286,7 +292,7 @@ def test_a_scheme_that_corrects_at_every_level_has_no_class():
     assert not smoothness_class(every, BODIES[:1]).passed
     assert [step.theorem for step in scheme_steps(every, (), 0, (3,))][-1] == "stars"
     once = [step.theorem for step in scheme_steps(default_subject(), (), 0, (3,))]
-    assert once[-5:] == ["folds", "turns", "limit", "class", "scale"]
+    assert once[-6:] == ["folds", "turns", "limit", "class", "scale", "numbers"]
 
 
 def test_a_scheme_that_goes_on_past_its_level_is_found():
@@ -349,3 +355,40 @@ def test_nan_fails_and_is_the_worst_and_bounds_read_as_what_they_mean():
         ("any", -np.inf, np.inf),
     ):
         assert Certificate("T1", "x", 0, low, high).bound == bound
+
+
+def directed_subject(base="loop"):
+    data = directed_model_bytes(0, 0.5, base)
+    model = model_from_bytes(data, "directed")
+    return subject_of_model(model, double_model(model, data))
+
+
+@pytest.mark.parametrize("base", ["loop", "catmull-clark"])
+def test_any_weights_of_directed_edges_pass_every_certificate(base):
+    subject = directed_subject(base)
+    assert subject.is_single_precision
+    made = run_steps(scheme_steps(subject, (), 0, (3,)), lambda *_: None)
+    assert not failed(made), [(each.name, each.value, each.where) for each in made]
+    once = {"folds", "turns", "limit", "class", "scale", "numbers", "rings"}
+    assert {each.theorem for each in made} == once | {f"T{number}" for number in range(1, 9)}
+    finite = keeps_its_word(directed_model(0, 0.5, base))
+    assert not failed(finite)
+    assert len(finite) == 5
+
+
+def test_a_rule_that_reads_numbers_is_found():
+    """The paper's reads the face of lower number first."""
+    subject = subject_of_network(random_network(1, scale=5.0))
+    assert failed([numbering(subject, BODIES)]) == {"numbering"}
+
+
+def test_a_network_that_sees_farther_than_it_says_is_found():
+    honest = directed_subject()
+    near = replace(honest, card=replace(honest.card, rounds=1))
+    assert failed([locality(near, BODIES)]) == {"locality"}
+
+
+def test_a_double_precision_twin_that_is_single_is_found():
+    honest = directed_subject()
+    rows = equivariance(replace(honest, exact=honest.scheme), BODIES[:1], 0)
+    assert "equivariance, double precision" in failed(rows)
