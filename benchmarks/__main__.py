@@ -124,7 +124,7 @@ def case_table(contested: dict[str, Any]) -> Table:
     for name, m in contested["methods"].items():
         ratio = f"{fastest / m['median']:.2f}" if fastest else "–"
         keys = ("cold", "first", "median", "least", "most", "processor")
-        space = m["mib"] * MIB / m["made_faces"]
+        space = m["mib"] * MIB / contested["faces"]
         effort = f"{least / m['processor']:.2f}" if least else "–"
         table.add_row(name, *(f"{m[k]:.3f}" for k in keys), f"{space:.0f}", ratio, effort)
     for name, reason in contested["left_out"].items():
