@@ -18,10 +18,10 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from .options import MAX_LEVELS, Limits
+from .options import MAX_LEVELS, PREFIX, Limits
 
 MIB = 1024**2
-PREFIX = "PNS_"
+LIMITS = Limits()
 # Two names of settings are a misspelling apart from this ratio of equal letters on (difflib).
 ALIKE = 0.7
 
@@ -158,13 +158,17 @@ class Settings(BaseSettings):
     )
 
     body: Size = Field(default=ByteSize(64 * MIB), description="largest request body")
-    faces: int = Field(default=5_000_000, gt=0, description="most faces predicted in an answer")
+    faces: int = Field(
+        default=LIMITS.max_faces, gt=0, description="most faces predicted in an answer"
+    )
     levels: int = Field(default=MAX_LEVELS, ge=1, le=MAX_LEVELS, description="deepest level")
     memory: Size = Field(
-        default=ByteSize(4096 * MIB), description="most memory predicted for one job"
+        default=ByteSize(LIMITS.max_memory_bytes), description="most memory predicted for one job"
     )
     json_items: int = Field(
-        default=2_000_000, gt=0, description="most structural characters in a glTF's JSON"
+        default=LIMITS.max_json_items,
+        gt=0,
+        description="most structural characters in a glTF's JSON",
     )
 
     workers: int = Field(default_factory=_worker_default, ge=1, description="worker processes")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from service.options import Limits
 from service.settings import Settings
 
 EXAMPLES = {
@@ -72,6 +73,7 @@ def test_the_documented_limits_are_the_defaults() -> None:
 def test_job_limits_are_the_settings() -> None:
     limits = Settings(faces=10, memory=20, json_items=30).job_limits()
     assert (limits.max_faces, limits.max_memory_bytes, limits.max_json_items) == (10, 20, 30)
+    assert Settings().job_limits() == Limits()
 
 
 @pytest.mark.parametrize(
