@@ -12,7 +12,7 @@ import pytest
 
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
-from service.http.server import DrainingServer
+from service.http.server import Server, configuration
 from service.meshfiles.example import part_glb
 from service.settings import Settings
 from tests.support import node_tools
@@ -33,7 +33,7 @@ def document():
 def address():
     """A server that really refines."""
     settings = Settings(workers=1, port=0)
-    server = DrainingServer(create_app(settings), settings)
+    server = Server(configuration(create_app(settings), settings))
     thread = threading.Thread(target=server.run)
     thread.start()
     pause = threading.Event()
