@@ -82,6 +82,34 @@ class ScaleFree:
     sharpness_levels: int
 
 
+@dataclass(frozen=True, slots=True)
+class DirectedRule:
+    """The rule of directed edges and its network (format 5), as on the card.
+
+    Attributes:
+        base: the base scheme, "loop" or "catmull-clark".
+        width, hidden, rounds: of states, of hidden layers, and of messages.
+        budget: C.
+        gate_sharpness, vertex_gate_sharpness: c, c_v.
+        network_scale: τ, in edge lengths.
+        curve_strength: of the prior along boundaries.
+        fold_angle: θ, degrees.
+        sharpness_levels: at how many levels sharp edges stay sharp; training takes two.
+    """
+
+    base: str
+    width: int
+    hidden: int
+    rounds: int
+    budget: float
+    gate_sharpness: float
+    vertex_gate_sharpness: float
+    network_scale: float
+    curve_strength: float
+    fold_angle: float
+    sharpness_levels: int
+
+
 class OneStep(msgspec.Struct, frozen=True, tag=True):
     """Training on one step, at the inserted vertices, over a fixed data set.
 
