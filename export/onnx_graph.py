@@ -33,30 +33,30 @@ def model_bytes(
     Only long-standing standard operators: GELU and SiLU are spelt out. Tied weights are written
     as the dense matrices that they make.
     """
-    graph = _Graph()
+    graph = Graph()
     _add_network(graph, network, "features", "correction")
-    inputs, outputs = [_rows("features", "edges", network)], [_answers("correction", "edges")]
+    inputs, outputs = [_rows("features", "edges", network)], [answers_info("correction", "edges")]
     if vertex_network is not None:
         graph.prefix = "vertex_"
         _add_network(graph, vertex_network, "vertex_features", "vertex_correction")
         inputs.append(_rows("vertex_features", "vertices", vertex_network))
-        outputs.append(_answers("vertex_correction", "vertices"))
+        outputs.append(answers_info("vertex_correction", "vertices"))
     if face_network is not None:
         graph.prefix = "face_"
         _add_network(graph, face_network, "face_features", "face_correction")
         inputs.append(_rows("face_features", "faces", face_network))
-        outputs.append(_answers("face_correction", "faces", 1))
+        outputs.append(answers_info("face_correction", "faces", 1))
     if sharpness_network is not None:
         graph.prefix = "sharpness_"
         answer = _perceptron(graph, sharpness_network, "sharpness_features")
         graph.apply("Sigmoid", answer, output="sharpness")
         # Rows of a name of their own: those of equal names share buffers, also between networks.
         inputs.append(_rows("sharpness_features", "sharpened", sharpness_network))
-        outputs.append(_answers("sharpness", "sharpened", 1))
+        outputs.append(answers_info("sharpness", "sharpened", 1))
     return _serialise(graph, inputs, outputs, card)
 
 
-class _Graph:
+class Graph:
     """Nodes and constants in the order of their making; constants are named with the prefix."""
 
     def __init__(self) -> None:
@@ -85,20 +85,20 @@ class _Graph:
         return name
 
 
-def _add_network(graph: _Graph, network: BoundedNet, features: str, output: str) -> None:
+def _add_network(graph: Graph, network: BoundedNet, features: str, output: str) -> None:
     perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
     columns = network.linear_layers[-1].out_features
     _project_onto_ball(graph, perceptron(graph, network, features), output, columns)
 
 
-def _perceptron(graph: _Graph, network: BoundedNet | SharpNet, value: str) -> str:
+def _perceptron(graph: Graph, network: BoundedNet | SharpNet, value: str) -> str:
     """Add the layers and return what the last one makes."""
     for index, layer in enumerate(network.linear_layers):
-        value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
+        value = _layer(graph, network, index, value, array(layer.weight), array(layer.bias))
     return value
 
 
-def _symmetric_perceptron(graph: _Graph, network: BoundedNet, features: str) -> str:
+def _symmetric_perceptron(graph: Graph, network: BoundedNet, features: str) -> str:
     """Add the layers for all G images of the features at once, and return the mean of D_g z(g φ).
 
     The images are made by the first layer's weights: W (g φ) = W_g φ, columns of W permuted and
@@ -107,22 +107,22 @@ def _symmetric_perceptron(graph: _Graph, network: BoundedNet, features: str) -> 
     assert isinstance(network, SymmetricNet)
     group, layers = network.group, network.linear_layers
     count, width = len(group.order), layers[0].out_features
-    first = _array(layers[0].weight)
+    first = array(layers[0].weight)
     images = np.zeros((count, *first.shape), dtype=np.float32)
     for g in range(count):
         images[g][:, group.order[g]] = first * group.signs[g]
-    stacked, bias = images.reshape(count * width, -1), np.tile(_array(layers[0].bias), count)
+    stacked, bias = images.reshape(count * width, -1), np.tile(array(layers[0].bias), count)
     value = _layer(graph, network, 0, features, stacked, bias)
     value = graph.apply("Reshape", value, graph.shape("row_an_image", [-1, width]))
     for index, layer in enumerate(layers[1:], start=1):
-        value = _layer(graph, network, index, value, _array(layer.weight), _array(layer.bias))
+        value = _layer(graph, network, index, value, array(layer.weight), array(layer.bias))
     value = graph.apply("Reshape", value, graph.shape("row_an_edge", [-1, 3 * count]))
     signed_mean = np.concatenate([np.diag(local) for local in group.local]) / count
     return graph.apply("MatMul", value, graph.constant("signed_mean", signed_mean))
 
 
 def _layer(
-    graph: _Graph,
+    graph: Graph,
     network: BoundedNet | SharpNet,
     index: int,
     value: str,
@@ -136,11 +136,12 @@ def _layer(
     return value if last else _ACTIVATIONS[network.activation](graph, value)
 
 
-def _array(tensor: Tensor) -> np.ndarray:
+def array(tensor: Tensor) -> np.ndarray:
+    """Return a tensor's values."""
     return tensor.detach().numpy()
 
 
-def _gelu(graph: _Graph, x: str) -> str:
+def _gelu(graph: Graph, x: str) -> str:
     # The exact one, x/2 (1 + erf(x/√2)).
     # In these operators onnxruntime knows it, and computes it in one of its own.
     root, unit = graph.constant("root_two", np.sqrt(2.0)), graph.constant("one", 1.0)
@@ -149,18 +150,19 @@ def _gelu(graph: _Graph, x: str) -> str:
     return graph.apply("Mul", graph.apply("Mul", x, half), graph.apply("Add", erf, unit))
 
 
-def _silu(graph: _Graph, x: str) -> str:
+def silu(graph: Graph, x: str) -> str:
+    """Add x σ(x)."""
     return graph.apply("Mul", x, graph.apply("Sigmoid", x))
 
 
-def _tanh(graph: _Graph, x: str) -> str:
+def _tanh(graph: Graph, x: str) -> str:
     return graph.apply("Tanh", x)
 
 
-_ACTIVATIONS = {"gelu": _gelu, "silu": _silu, "tanh": _tanh}
+_ACTIVATIONS = {"gelu": _gelu, "silu": silu, "tanh": _tanh}
 
 
-def _project_onto_ball(graph: _Graph, z: str, output: str, columns: int) -> None:
+def _project_onto_ball(graph: Graph, z: str, output: str, columns: int) -> None:
     """Add budget · z / √max(1, ‖z‖²).
 
     A product with ones puts ‖z‖² into all columns: onnxruntime divides equal shapes several
@@ -173,19 +175,30 @@ def _project_onto_ball(graph: _Graph, z: str, output: str, columns: int) -> None
 
 
 def _rows(name: str, rows: str, network: BoundedNet | SharpNet) -> ValueInfoProto:
-    width = network.linear_layers[0].in_features
+    return rows_info(name, rows, network.linear_layers[0].in_features)
+
+
+def rows_info(name: str, rows: str, width: int) -> ValueInfoProto:
+    """Describe an input of so many columns."""
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, width])
 
 
-def _answers(name: str, rows: str, columns: int = 3) -> ValueInfoProto:
+def answers_info(name: str, rows: str, columns: int = 3) -> ValueInfoProto:
+    """Describe an output of so many columns."""
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, columns])
 
 
 def _serialise(
-    graph: _Graph, features: list[ValueInfoProto], outputs: list[ValueInfoProto], card: ModelCard
+    graph: Graph, features: list[ValueInfoProto], outputs: list[ValueInfoProto], card: ModelCard
 ) -> bytes:
     budget = helper.make_tensor_value_info("budget", TensorProto.FLOAT, [])
-    inputs = [features[0], budget, *features[1:]]
+    return serialised(graph, [features[0], budget, *features[1:]], outputs, card)
+
+
+def serialised(
+    graph: Graph, inputs: list[ValueInfoProto], outputs: list[ValueInfoProto], card: ModelCard
+) -> bytes:
+    """Return the checked bytes of a model file."""
     model = helper.make_model(
         helper.make_graph(graph.nodes, "pns", inputs, outputs, initializer=graph.constants),
         opset_imports=[helper.make_opsetid("", OPSET)],

@@ -37,6 +37,7 @@ class Creases:
         vertex_sharpness: (M,) at how many levels these are corners, 0 … infinity: s at level 0,
             s − 1 at level 1, and so on, OpenSubdiv's numbers. What is less than a level is the
             corner weight κ there: (1 − κ) the rule without + κ p. None: at as many as the edges.
+        soft_corners: (V,) corner weight κ of every vertex, at as many levels as the edges; None: 0.
         border: what boundaries do. "smooth": they become curves. "corners": these end at vertices
             of one face alone. "fixed": they stay as they are.
 
@@ -54,6 +55,7 @@ class Creases:
     vertices: Integer[np.ndarray, " M"] | None = None
     vertex_sharpness: Float[np.ndarray, " M"] | None = None
     border: str = "smooth"
+    soft_corners: Float[np.ndarray, " V"] | None = None
 
     def __post_init__(self) -> None:
         if self.named is not None:
@@ -131,6 +133,8 @@ class Creases:
             ParameterError: a named pair is no edge of the mesh, or a vertex is not there.
         """
         topology = topology.with_border(self.border)
+        if self.soft_corners is not None:
+            topology = topology.with_soft_corners(self.soft_corners)
         if self.vertices is not None and len(self.vertices):
             check_vertices("vertices", self.vertices, topology.vertex_count)
             sharpness = np.zeros(topology.vertex_count)

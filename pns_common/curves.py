@@ -95,14 +95,22 @@ def find_curves(
 def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 3"]:
     """Return d of all vertices, 0 beside curves; ``gate_sharpness`` is c_v."""
     a, b = curves.a, curves.b
-    turning = 1 + np.einsum("ij,ij->i", _unit(a), _unit(b))
-    fade = np.clip((CORNER - turning) / (CORNER - BEND), 0.0, 1.0)
-    gate = np.tanh(gate_sharpness * turning) * fade
+    gate = np.tanh(gate_sharpness * _turning(curves)) * (1 - corner_shares(curves))
     along, middle = _unit(b - a), (a + b) / 2
     off = middle - np.einsum("ij,ij->i", middle, along)[:, None] * along
     pushes = np.zeros((len(curves.movable), 3))
     pushes[curves.rows] = -(curves.shares[: len(curves.rows)] * gate / 3)[:, None] * off
     return pushes
+
+
+def corner_shares(curves: Curves) -> Float[np.ndarray, " N"]:
+    """Return 1 − f of the vertices ``curves.rows``: 1 where the curve turns by a right angle."""
+    return np.clip((_turning(curves) - BEND) / (CORNER - BEND), 0.0, 1.0)
+
+
+def _turning(curves: Curves) -> Float[np.ndarray, " N"]:
+    """Return 1 − cos of the turning angles."""
+    return 1 + np.einsum("ij,ij->i", _unit(curves.a), _unit(curves.b))
 
 
 def curve_prior(curves: Curves, pushes: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "M 3"]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Float32, Integer
+from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError
 from pns_common.kernels import directed as kernels
@@ -93,6 +93,18 @@ def on_border(level: Level) -> np.ndarray:
     """Return which vertices end an edge that is not between two faces."""
     counts = level.topology.sharp_count
     return counts > 0 if len(counts) else np.zeros(len(level.points), dtype=bool)
+
+
+def answers_of(level: Level, networks: DirectedNetworks) -> Answers:
+    """Return what the networks answer on a mesh; they are asked once.
+
+    Raises:
+        ModelError: an answer is not finite, or has another shape.
+    """
+    kept = vars(level.unmarked)
+    if "answers" not in kept:
+        kept["answers"] = ask(level.unmarked, networks)
+    return kept["answers"]
 
 
 def ask(level: Level, networks: DirectedNetworks) -> Answers:

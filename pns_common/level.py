@@ -69,8 +69,9 @@ class Level:
     def with_topology(self, topology: Topology) -> Level:
         """Return the level with other sharpness, and what is known of its faces."""
         made = replace(self, topology=topology)
-        if "faces" in vars(self):
-            vars(made)["faces"] = self.faces
+        for known in ("faces", "unmarked"):
+            if known in vars(self):
+                vars(made)[known] = vars(self)[known]
         return made
 
     @cached_property

@@ -46,7 +46,7 @@ def limit_shift(
     base: BaseScheme = LOOP,
 ) -> float:
     """Return how far creases and corners move the limit of a vertex, at most; 0 without any."""
-    if not (len(topology.crease_edges) or len(topology.soft) or len(topology.vertex_sharpness)):
+    if not (len(topology.crease_edges) or len(topology.soft) or topology.has_corners):
         return 0.0
     smooth = limit_positions(points, topology.without_creases(), blocks, base)
     moved = limit_positions(points, topology, blocks, base) - smooth

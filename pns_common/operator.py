@@ -42,11 +42,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
+from pns_common.directed import DirectedNetworks, answers_of
 from pns_common.errors import ModelError, ParameterError
 from pns_common.features import FeatureSet
 from pns_common.kernels import children, correction, frames, measures, quads
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
+from pns_common.topology import Topology
 
 # Rows of each call of a network: fixed, so that answers do not depend on threads; one chunk.
 NETWORK_ROWS = 4096
@@ -198,6 +200,147 @@ def learned_level(level: Level, rule: Rule) -> Additions:
     made.scale(scale)
     x += delta
     return Additions(x, None, *made.arrays, level.ringed | curves.movable, degenerate, scale)
+
+
+@dataclass(frozen=True)
+class DirectedRule:
+    """Networks of directed edges, and the numbers of their rule.
+
+    Attributes:
+        networks: those of a model of format 5.
+        gate_sharpness, vertex_gate_sharpness: c and c_v.
+        budget: C.
+        curve_strength: strength of the prior along boundaries and marked creases.
+        network_scale: τ, the longest way that the network may ask for, in edge lengths.
+        fold_angle: θ in degrees, above 0 and below 90.
+    """
+
+    networks: DirectedNetworks
+    gate_sharpness: float
+    vertex_gate_sharpness: float
+    budget: float
+    curve_strength: float
+    network_scale: float
+    fold_angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """All that surrounds the network's answers at the edges, vertices and faces of a mesh.
+
+    Attributes:
+        flat: D of all new vertices, 0 where no network acts.
+        gates, bounds, lengths: γ, ρ and h of vertices, edges and faces, each an array.
+        rows: those of each at which the network acts.
+    """
+
+    flat: Float[np.ndarray, "W 3"]
+    gates: tuple[Float[np.ndarray, " N"], ...]
+    bounds: tuple[Float[np.ndarray, " N"], ...]
+    lengths: tuple[Float[np.ndarray, " N"], ...]
+    rows: tuple[Integer[np.ndarray, " N"], ...]
+
+
+def directed_level(level: Level, rule: DirectedRule) -> Additions:
+    """Apply a rule of directed edges at a level.
+
+    Raises:
+        ModelError: a network's answer is not finite, or has another shape.
+    """
+    mesh, base, count = level.topology, level.base, len(level.points)
+    x = base.place(level.points, mesh, level.blocks)  # x0
+    said, around = answers_of(level, rule.networks), surroundings(level, rule, x)
+    delta = around.flat  # D, to become δ
+    made = _Rows.starting_with(delta)
+    asked = said.vertices, said.edges, along_normals(level, said.faces)
+    firsts = 0, count, count + len(mesh.edges)
+    for u, first, rows, gate, bound, h in zip(
+        asked, firsts, around.rows, around.gates, around.bounds, around.lengths, strict=True
+    ):
+        read = rows, first, u, rule.network_scale * h, gate, bound
+
+        def correct(begin: int, end: int, read: Any = read) -> None:
+            correction.correct_from_flat(*read[:2], begin, end, *read[2:], *made.arrays)
+
+        level.blocks.run(len(rows), correct)
+    curves = find_curves(level.points, mesh.without_soft(), len(x))
+    along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+    made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
+    scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
+    made.scale(scale)
+    x += delta
+    frameless = int(np.count_nonzero(level.unmarked.edges.lengths[mesh.interior] == 0))
+    movable = level.ringed | curves.movable
+    return Additions(x, None, *made.arrays, movable, frameless, scale)
+
+
+def surroundings(
+    level: Level, rule: DirectedRule, base_points: Float[np.ndarray, "W 3"]
+) -> Surroundings:
+    """Return what surrounds the network's answers; ``base_points`` are x0."""
+    mesh, seen, points = level.topology, level.unmarked, level.points
+    edge_count = len(mesh.edges)
+    flat = np.concatenate([points, (points[mesh.edges[:, 0]] + points[mesh.edges[:, 1]]) / 2])
+    faces = np.arange(mesh.face_count if level.base.polygons else 0)
+    in_faces = np.diff(mesh.offsets)[faces]
+    if len(faces):
+        centres = np.add.reduceat(points[mesh.corners], mesh.offsets[:-1]) / in_faces[:, None]
+        flat = np.concatenate([flat, centres])
+    flat -= base_points
+    lengths, squares = seen.edges.lengths, seen.rings.means[:, measures.SQUARE]
+    of_faces = np.zeros(0)
+    if len(faces):
+        around = lengths[mesh.corner_edges] ** 2
+        of_faces = np.add.reduceat(around, mesh.offsets[:-1]) / in_faces
+    rows = np.flatnonzero(level.ringed), mesh.interior, faces
+    at_rest = np.ones(len(flat), dtype=bool)
+    for first, moved in zip((0, len(points), len(points) + edge_count), rows, strict=True):
+        at_rest[first + moved] = False
+    flat[at_rest] = 0.0
+    per_length = rule.budget / _unit_length(level)
+    return Surroundings(
+        flat,
+        directed_gates(mesh, seen.edges.jumps, mesh.sharpness, rule),
+        (per_length * squares, per_length * lengths**2, per_length * of_faces),
+        (np.sqrt(squares), lengths, np.sqrt(of_faces)),
+        rows,
+    )
+
+
+def directed_gates(
+    mesh: Topology,
+    jumps: Float[np.ndarray, " E"],
+    sharpness: Float[np.ndarray, " E"],
+    rule: DirectedRule,
+) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+    """Return γ of vertices, edges and faces.
+
+    γ_f = largest (1 − w) tanh(c_v x) over the face's edges; γ_v = largest γ_f around the vertex;
+    γ_e = γ₂ (1 − w + w γ_open) + (1 − γ₂) γ_shut, of the face that is more and the one that is
+    less open.
+    """
+    of_edges = (1 - sharpness) * np.tanh(rule.vertex_gate_sharpness * jumps)
+    opened = np.maximum.reduceat(of_edges[mesh.corner_edges], mesh.offsets[:-1])
+    at_corners = np.repeat(opened, np.diff(mesh.offsets))
+    at_vertices = np.zeros(mesh.vertex_count)
+    np.maximum.at(at_vertices, mesh.corners, at_corners)
+    most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
+    np.maximum.at(most, mesh.corner_edges, at_corners)
+    np.minimum.at(least, mesh.corner_edges, at_corners)
+    second = np.tanh(rule.gate_sharpness * jumps**2)
+    bent = 1 - sharpness * (1 - most)
+    return at_vertices, second * bent + (1 - second) * least, opened
+
+
+def along_normals(level: Level, heights: Float[np.ndarray, " F"]) -> Float[np.ndarray, "F 3"]:
+    """Return so long vectors along the normals of faces."""
+    return heights[:, None] * level.normals[: len(heights)]
+
+
+def _unit_length(level: Level) -> float:
+    if not level.reference_length:
+        raise ParameterError("reference_length", level.reference_length, expected="R > 0")
+    return level.reference_length
 
 
 # --- what surrounds the networks ------------------------------------------------------------------

@@ -37,9 +37,10 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
     vertex_count = parent.vertex_count + edge_count + parent.face_count
     offsets = np.arange(0, len(corners) + 1, QUAD, dtype=np.int32)
     worn = parent.worn_vertices(vertex_count)
+    soft_corners = parent.soft_corners_of_split(vertex_count) if inherit else NO_WEIGHTS
     if not parent.plain:
         made = build_topology((corners, offsets), vertex_count, blocks)
-        made = replace(made, vertex_sharpness=worn)
+        made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
         return inheriting(made, parent) if inherit else made
     source = parent if inherit else parent.without_creases()
     halves, arrays = np.empty((edge_count, 2), np.uint32), (parent.corners, parent.offsets)
@@ -72,4 +73,5 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
         soft,
         worn,
         plain=True,
+        soft_corners=soft_corners,
     )

@@ -20,7 +20,7 @@ from pns_common.limit import limit_normals, limit_positions, limit_shift
 from pns_common.matrix import SubdivisionMatrix, subdivision_matrix
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
-from pns_common.operator import Additions, learned_level
+from pns_common.operator import Additions, DirectedRule, directed_level, learned_level
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
 from pns_common.progress import Progress
@@ -325,7 +325,8 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
     if scheme.acts_at(depth) and level.reference_length and scheme.rule is not None:
         # An absurd budget overflows, which is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):
-            added = learned_level(level, scheme.rule)
+            act = directed_level if isinstance(scheme.rule, DirectedRule) else learned_level
+            added = act(level, scheme.rule)
         points = added.points
     else:
         points = level.base.place(level.points, level.topology, level.blocks)
@@ -341,7 +342,7 @@ def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None
     """
     mesh = level.topology
     rows = np.concatenate([mesh.crease_edges, np.flatnonzero(mesh.soft)])
-    corners = np.flatnonzero(mesh.vertex_sharpness)
+    corners = np.flatnonzero(mesh.corner_weights)
     if len(rows) == 0 and len(corners) == 0:
         return None
     smooth = level.base.place(level.points, mesh.without_creases(), level.blocks.quiet())

@@ -19,12 +19,20 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.creases import Creases
+from pns_common.curves import corner_shares, find_curves
+from pns_common.directed import answers_of
 from pns_common.kernels import sharpness as kernels
 from pns_common.level import Level
 from pns_common.mesh import Mesh, check_is_mesh
 from pns_common.model.file import load_model
 from pns_common.normals import measure_faces
-from pns_common.operator import NETWORK_ROWS, Rule, checked_answers
+from pns_common.operator import (
+    NETWORK_ROWS,
+    DirectedRule,
+    Rule,
+    checked_answers,
+    directed_gates,
+)
 from pns_common.parallel import Blocks
 from pns_common.schemes import Scheme, loop, pns
 from pns_common.topology import Topology
@@ -119,9 +127,7 @@ def learned_sharpness(level: Level, rule: Rule) -> Float[np.ndarray, " E"]:
     def ask(begin: int, end: int) -> None:
         asked = rows[begin:end]
         answers = checked_answers(network, seen.features(asked), 1)
-        w = gate[asked] * np.clip(answers[:, 0], 0.0, 1.0)
-        w = np.maximum(w - LEAST_SHARPNESS, 0.0) / (1 - LEAST_SHARPNESS)
-        made[asked] = np.minimum(w, SHARPEST)
+        made[asked] = np.minimum(clearly(gate[asked] * np.clip(answers[:, 0], 0.0, 1.0)), SHARPEST)
 
     level.blocks.quiet().of_rows(NETWORK_ROWS).run(len(rows), ask)
     return made
@@ -187,8 +193,42 @@ def with_sharp_edges(level: Level, creases: Creases, scheme: Scheme) -> Level:
     level = level.with_creases(creases)
     if not (creases.learned and scheme.rule):
         return level
+    if isinstance(scheme.rule, DirectedRule):
+        made = level.topology.with_sharpness(shares_of_edges(level, scheme.rule))
+        return level.with_topology(made.with_soft_corners(shares_of_corners(level, scheme.rule)))
     made = level.topology.with_sharpness(learned_sharpness(level, scheme.rule))
     return level.with_topology(made)
+
+
+def shares_of_edges(level: Level, rule: DirectedRule) -> Float[np.ndarray, " E"]:
+    """Return w of each edge: 0 at edges without two faces, and on planes."""
+    answers, seen = answers_of(level, rule.networks), level.unmarked
+    gate = np.tanh(rule.vertex_gate_sharpness * seen.edges.jumps)
+    return np.minimum(clearly(gate * answers.sharpness), SHARPEST)
+
+
+def shares_of_corners(level: Level, rule: DirectedRule) -> Float[np.ndarray, " V"]:
+    """Return κ of each vertex: the network's inside, 0 on planes; on a border the border's own.
+
+    Where a border turns by 60 to 90 degrees κ grows from 0 to 1, whatever lies inside, so that
+    pieces that share a border keep the same corners.
+    """
+    answers, seen = answers_of(level, rule.networks), level.unmarked
+    mesh = seen.topology
+    smooth = np.zeros(len(mesh.edges))
+    gate, _, _ = directed_gates(mesh, seen.edges.jumps, smooth, rule)
+    shares = clearly(gate * answers.corners)
+    counts = mesh.sharp_count
+    if len(counts):
+        shares[counts > 0] = 0.0
+        curves = find_curves(level.points, mesh)
+        shares[curves.rows] = corner_shares(curves)
+    return shares
+
+
+def clearly(shares: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """Return shares of which those below LEAST_SHARPNESS are 0, without a jump."""
+    return np.maximum(shares - LEAST_SHARPNESS, 0.0) / (1 - LEAST_SHARPNESS)
 
 
 def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
@@ -203,7 +243,9 @@ def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
     found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
     sharpness = topology.sharpness[found] if len(topology.soft) else None
     edges = topology.edges[found].astype(np.int64)
-    return replace(creases, named=edges, sharpness=sharpness, angle=None, learned=False)
+    corners = topology.soft_corners if len(topology.soft_corners) else None
+    named = {"named": edges, "sharpness": sharpness, "soft_corners": corners}
+    return replace(creases, angle=None, learned=False, **named)
 
 
 def sharp_edges(

@@ -6,7 +6,7 @@ appearance over the faces, (a, b), (b, c), … from each face's first corner on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 
@@ -73,6 +73,8 @@ class Topology:
         vertex_sharpness: (V,) at how many more levels each vertex is a corner, infinity for good,
             its last part in part; (0,) where none is.
         plain: no face names a vertex twice, and no two triangles have the same vertices.
+        soft_corners: (V,) learned corner weight κ in [0, 1] of each vertex, which lasts as long as
+            the sharpness of edges; (0,) where it is 0 at all.
     """
 
     vertex_count: int
@@ -86,6 +88,7 @@ class Topology:
     soft: Float[np.ndarray, " S"]
     vertex_sharpness: Float[np.ndarray, " K"]
     plain: bool
+    soft_corners: Float[np.ndarray, " C"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -158,14 +161,20 @@ class Topology:
     @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
+        made = np.zeros(self.vertex_count)
         if len(self.vertex_sharpness):
-            return np.minimum(self.vertex_sharpness, 1.0)
-        return np.zeros(self.vertex_count)
+            made = np.minimum(self.vertex_sharpness, 1.0)
+        return np.maximum(made, self.soft_corners) if len(self.soft_corners) else made
+
+    @property
+    def has_corners(self) -> bool:
+        """True where any vertex has a corner weight."""
+        return len(self.vertex_sharpness) > 0 or len(self.soft_corners) > 0
 
     @cached_property
     def sharpest(self) -> SharpVertices | None:
         """The vertices on sharp and soft edges, and corners; None where there is none of all."""
-        if not (len(self.sharp_edges) or len(self.soft) or len(self.vertex_sharpness)):
+        if not (len(self.sharp_edges) or len(self.soft) or self.has_corners):
             return None
         edges = self.sharp_edges
         if len(self.soft):
@@ -173,7 +182,7 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        if len(self.vertex_sharpness):
+        if self.has_corners:
             corner = self.corner_weights[:, None]
             weights = corner + (1 - corner) * weights
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
@@ -252,6 +261,18 @@ class Topology:
             sharpness = np.maximum(sharpness, self.vertex_sharpness)
         return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
 
+    def with_soft_corners(self, weights: Float[np.ndarray, " V"]) -> Topology:
+        """Return a copy with learned corner weights, where they are less."""
+        if len(self.soft_corners):
+            weights = np.maximum(weights, self.soft_corners)
+        return replace(self, soft_corners=weights if weights.any() else NO_WEIGHTS)
+
+    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " C"]:
+        """Return ``soft_corners`` a level later, where there are ``count`` vertices."""
+        if len(self.soft_corners) == 0:
+            return NO_WEIGHTS
+        return np.concatenate([self.soft_corners, np.zeros(count - self.vertex_count)])
+
     def worn_vertices(self, count: int) -> Float[np.ndarray, " K"]:
         """Return ``vertex_sharpness`` a level later, where there are ``count`` vertices."""
         if not (self.vertex_sharpness > 1).any():
@@ -263,8 +284,12 @@ class Topology:
     def without_creases(self) -> Topology:
         """Return a copy without creases, soft edges and corners."""
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
-        kept = {"soft": NO_WEIGHTS, "vertex_sharpness": NO_WEIGHTS}
-        return replace(self, edge_class=classes.astype(np.int8), **kept)
+        none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
+        return replace(self, edge_class=classes.astype(np.int8), **none)
+
+    def without_soft(self) -> Topology:
+        """Return a copy without soft edges and learned corners: what a user or a file marks."""
+        return replace(self, soft=NO_WEIGHTS, soft_corners=NO_WEIGHTS)
 
     def rows_of(
         self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
@@ -363,8 +388,10 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
     worn = parent.worn_vertices(vertex_count)
+    soft_corners = parent.soft_corners_of_split(vertex_count) if inherit else NO_WEIGHTS
     if not parent.plain:
-        made = replace(build_topology(faces, vertex_count, blocks), vertex_sharpness=worn)
+        made = build_topology(faces, vertex_count, blocks)
+        made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
         return inheriting(made, parent) if inherit else made
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
@@ -399,6 +426,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         child_soft,
         worn,
         plain=True,
+        soft_corners=soft_corners,
     )
 
 

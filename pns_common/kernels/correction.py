@@ -114,6 +114,30 @@ def correct_by_prior(
 
 
 @kernel
+def correct_from_flat(
+    rows, first, begin, end, asked, reach, gate, bound, displacement, ratio, gates, bounds
+):
+    """Write δ = γ Π_ρ(D + τ h u), ‖u‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
+
+    Args:
+        asked: u = F z of all N edges, vertices or faces; rows count in it, and in these:
+        reach, gate, bound: (N,) τ h, γ, ρ.
+        displacement: in: D; out: δ.
+    """
+    for i in range(max(begin, 0), end):
+        here = rows[i]
+        at, u = first + here, in_ball(row(asked, here))
+        wanted = (
+            displacement[at, 0] + reach[here] * u[0],
+            displacement[at, 1] + reach[here] * u[1],
+            displacement[at, 2] + reach[here] * u[2],
+        )
+        inside, size = shortened(wanted, bound[here]), gate[here]
+        delta = size * inside[0], size * inside[1], size * inside[2]
+        _write(at, delta, size, bound[here], displacement, ratio, gates, bounds)
+
+
+@kernel
 def add_on_curves(rows, share, prior, bound, displacement, ratio, bounds):
     """Add share Π_ρ(D) to δ at new vertices of curves: ``rows`` of the output, with ρ = ``bound``.
 

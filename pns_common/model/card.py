@@ -14,13 +14,19 @@ from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
+from pns_common.features import (
+    DIRECTED_28,
+    FACE_FEATURE_SETS,
+    FEATURE_SETS,
+    RING_FEATURE_SETS,
+)
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
-PAPER_FORMAT, DEFAULT_FORMAT = 1, 4
+PAPER_FORMAT, DEFAULT_FORMAT, DIRECTED_FORMAT = 1, 4, 5
 RETIRED_FORMATS = (2, 3)
 
+DIRECTED_FEATURES: Mapping[str, int] = MappingProxyType({DIRECTED_28.name: DIRECTED_28.count})
 # How many columns each feature set has.
 EDGE_FEATURES, VERTEX_FEATURES, FACE_FEATURES = (
     MappingProxyType({name: seen.count for name, seen in sets.items()})
@@ -58,6 +64,8 @@ class ModelCard:
             over Loop, which has no vertices in faces.
         sharpness_features: Name of the feature set that the sharpness network reads; None: there is
             none.
+        width: W, how many numbers the state of a directed edge has; format 5.
+        rounds: How many rounds of messages these exchange; format 5.
     """
 
     format: int
@@ -77,6 +85,8 @@ class ModelCard:
     sharpness_levels: int | None = None
     face_features: str | None = None
     sharpness_features: str | None = None
+    width: int | None = None
+    rounds: int | None = None
 
     def to_json(self) -> str:
         """Return the card as JSON, keys in the order of the attributes, without fields of None."""
@@ -103,8 +113,27 @@ class ModelCard:
         return card
 
 
-FORMAT_4_FIELDS = tuple(field.name for field in fields(ModelCard) if field.default is None)
-OPTIONAL_FIELDS = frozenset({"face_features", "sharpness_features"})
+_LEARNED_ONCE = frozenset(
+    {
+        "base",
+        "vertex_gate_sharpness",
+        "boundary_strength",
+        "network_scale",
+        "fold_angle",
+        "sharpness_levels",
+    }
+)
+# Beside the fields without a default: what a card of a format must have, and what it may have.
+NEEDED: Mapping[int, frozenset[str]] = MappingProxyType(
+    {
+        PAPER_FORMAT: frozenset(),
+        DEFAULT_FORMAT: _LEARNED_ONCE | {"vertex_features", "prior_strength"},
+        DIRECTED_FORMAT: _LEARNED_ONCE | {"width", "rounds"},
+    }
+)
+ALLOWED: Mapping[int, frozenset[str]] = MappingProxyType(
+    {DEFAULT_FORMAT: frozenset({"face_features", "sharpness_features"})}
+)
 
 Range = tuple[Callable[[Any], bool], str]
 
@@ -120,7 +149,7 @@ _STRENGTH: Range = (
 )
 _RANGES: Mapping[str, Range] = MappingProxyType(
     {
-        "features": _one_of(EDGE_FEATURES),
+        "features": _one_of({**EDGE_FEATURES, **DIRECTED_FEATURES}),
         "gate_sharpness": _POSITIVE,
         "budget": _POSITIVE,
         "orientation": _one_of(ORIENTATIONS),
@@ -137,6 +166,8 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
             f"from 0 to {MOST_SHARPNESS_LEVELS}",
         ),
         "sharpness_features": _one_of(SHARPNESS_FEATURES),
+        "width": (lambda value: 2 <= value <= 128 and value % 2 == 0, "even, from 2 to 128"),
+        "rounds": (lambda value: 1 <= value <= 8, "from 1 to 8"),
     }
 )
 
@@ -162,7 +193,7 @@ def _check_format(version: object) -> None:
     """Check the format before all else. Raises ValueError."""
     if version in RETIRED_FORMATS:
         raise ValueError(f"format {version}, which was never released: export the model anew")
-    if version not in (PAPER_FORMAT, DEFAULT_FORMAT):
+    if version not in NEEDED:
         raise ValueError(f"format {version}")
 
 
@@ -200,13 +231,19 @@ def _kinds(hint: Any) -> tuple[Any, ...]:
 
 
 def _check_fields_of_format(card: ModelCard) -> None:
-    """Check that the fields of format 4 stand there and only there. Raises ValueError."""
-    for name in FORMAT_4_FIELDS:
-        given = getattr(card, name) is not None
-        if given and card.format != DEFAULT_FORMAT:
-            raise ValueError(f"unknown field {name} in format {card.format}")
-        if not given and card.format == DEFAULT_FORMAT and name not in OPTIONAL_FIELDS:
-            raise ValueError(f"missing field {name} in format {card.format}")
-    if (card.base == "catmull-clark") != (card.face_features is not None):
+    """Check that the fields of its format stand there and no others. Raises ValueError."""
+    given = {field.name for field in fields(card) if getattr(card, field.name) is not None}
+    needed = NEEDED[card.format]
+    allowed = needed | ALLOWED.get(card.format, frozenset())
+    optional = {field.name for field in fields(card) if field.default is None}
+    for name in sorted(given & optional - allowed):
+        raise ValueError(f"unknown field {name} in format {card.format}")
+    for name in sorted(needed - given):
+        raise ValueError(f"missing field {name} in format {card.format}")
+    if (card.features in DIRECTED_FEATURES) != (card.format == DIRECTED_FORMAT):
+        raise ValueError(f"features {card.features!r} in format {card.format}")
+    if card.format == DEFAULT_FORMAT and (card.base == "catmull-clark") != (
+        card.face_features is not None
+    ):
         problem = "missing" if card.face_features is None else "unknown"
         raise ValueError(f"{problem} field face_features over {card.base}")

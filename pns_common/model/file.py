@@ -24,7 +24,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
-from pns_common.model.card import CARD_KEY, ModelCard
+from pns_common.model.card import CARD_KEY, DIRECTED_FORMAT, ModelCard
 from pns_common.model.session import CHUNK_ROWS, CPU, Model, Network, OnnxModel, networks
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def check_file(data: bytes, name: str) -> ModelCard:
     _check_graph(proto, name)
     _check_valid(proto, name)
     held = networks(card)
-    _check_signatures(proto, held, name)
+    _check_signatures(proto, card, held, name)
     for network in held:
         _check_call(proto, network, name)
     return card
@@ -196,7 +196,7 @@ def _card(proto: ModelProto, name: str) -> ModelCard:
     try:
         return ModelCard.from_json(texts[0])
     except ValueError as error:
-        expected = "a model card of format 1 or 4"
+        expected = "a model card of format 1, 4 or 5"
         raise ModelError(name, expected=expected, found=str(error)) from error
 
 
@@ -244,7 +244,9 @@ def _check_valid(proto: ModelProto, name: str) -> None:
         raise ModelError(name, expected="a valid ONNX model", found=_reason(error)) from error
 
 
-def _check_signatures(proto: ModelProto, held: Sequence[Network], name: str) -> None:
+def _check_signatures(
+    proto: ModelProto, card: ModelCard, held: Sequence[Network], name: str
+) -> None:
     """Check inputs and outputs against the networks of the card. Raises ModelError."""
     graph = proto.graph
     weights = {tensor.name for tensor in graph.initializer}
@@ -252,8 +254,9 @@ def _check_signatures(proto: ModelProto, held: Sequence[Network], name: str) -> 
     outputs = [_signature(value) for value in graph.output]
     rows: list[Signature] = [(each.given, "FLOAT", ["*", each.columns]) for each in held]
     answers: list[Signature] = [(each.answer, "FLOAT", ["*", each.answer_columns]) for each in held]
+    budget: list[Signature] = [("budget", "FLOAT", [])] * (card.format != DIRECTED_FORMAT)
     wanted: list[tuple[str, list[Signature], list[Signature]]] = [
-        ("inputs", [*rows, ("budget", "FLOAT", [])], inputs),
+        ("inputs", [*rows, *budget], inputs),
         ("outputs", answers, outputs),
     ]
     for what, expected, found in wanted:

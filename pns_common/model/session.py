@@ -19,6 +19,8 @@ from jaxtyping import Float, Float32
 from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import (
     CARD_KEY,
+    DIRECTED_FEATURES,
+    DIRECTED_FORMAT,
     EDGE_FEATURES,
     FACE_FEATURES,
     SHARPNESS_FEATURES,
@@ -31,6 +33,8 @@ CHUNK_ROWS = 4096
 # Chunks are padded to a multiple: for a single row onnxruntime may call another kernel.
 ROW_MULTIPLE = 16
 CPU = ("CPUExecutionProvider",)
+# Of a directed edge: states in a message, and answers without a face's.
+MESSAGE_PARTS, HEADS = 6, 8
 
 
 @runtime_checkable
@@ -64,6 +68,10 @@ class Model(Protocol):
         """Return the sharpness of edges, (N, 1); where the card names features for it alone."""
         ...
 
+    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
+        """Return the answers of a network of directed edges; format 5 alone."""
+        ...
+
 
 class PolygonModel(Model, Protocol):
     """A model over Catmull–Clark, whose third network places the vertices of faces."""
@@ -85,6 +93,8 @@ class Network:
 
 def networks(card: ModelCard) -> tuple[Network, ...]:
     """Return the networks that a file with this card holds."""
+    if card.format == DIRECTED_FORMAT:
+        return _directed_networks(card)
     held = [Network("features", EDGE_FEATURES[card.features], "correction", 3)]
     if card.vertex_features is not None:
         columns = VERTEX_FEATURES[card.vertex_features]
@@ -96,6 +106,24 @@ def networks(card: ModelCard) -> tuple[Network, ...]:
         columns = SHARPNESS_FEATURES[card.sharpness_features]
         held.append(Network("sharpness_features", columns, "sharpness", 1))
     return tuple(held)
+
+
+def _directed_networks(card: ModelCard) -> tuple[Network, ...]:
+    """Return the encoder, the rounds and the heads of a model of directed edges."""
+    assert card.width is not None
+    assert card.rounds is not None
+    width, answers = card.width, heads_of(card)
+    rounds = (
+        Network(f"messages_{n}", MESSAGE_PARTS * width, f"update_{n}", width)
+        for n in range(1, card.rounds + 1)
+    )
+    encoder = Network("features", DIRECTED_FEATURES[card.features], "state", width)
+    return encoder, *rounds, Network("states", width, "heads", answers)
+
+
+def heads_of(card: ModelCard) -> int:
+    """Return how many answers a directed edge gives: one more where faces have a vertex."""
+    return HEADS + (card.base == "catmull-clark")
 
 
 class OnnxModel:
@@ -188,6 +216,16 @@ class OnnxModel:
         """
         return self._answers("sharpness_features", features, 1.0)
 
+    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "N A"]:
+        """Run a network of directed edges: that which reads the input ``given``.
+
+        Raises:
+            ParameterError: rows of another shape.
+            ModelError: the model has no such network, the graph fails, or an answer is not finite
+                or of another shape.
+        """
+        return self._answers(given, rows, 1.0)
+
     def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
         network = self._networks.get(given)
         if network is None:
@@ -234,6 +272,8 @@ class OnnxModel:
             network.given: np.zeros((1, network.columns), dtype=np.float32)
             for network in self._networks.values()
         }
+        if self.card.format == DIRECTED_FORMAT:
+            return rows
         return {**rows, "budget": np.asarray(budget, dtype=np.float32)}
 
     def _run(self, session: Any, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -73,7 +73,8 @@ def limit_positions(
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
     mesh, count, sharp = topology, topology.vertex_count, topology.sharpest
-    smooth = replace(mesh, soft=NO_WEIGHTS, vertex_sharpness=NO_WEIGHTS)
+    none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
+    smooth = replace(mesh, **none)
     placed = place(points, smooth, blocks)
     read = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges, mesh.corner_reach
     sums, edge_count = np.empty((count, WIDTH + 1)), len(mesh.edges)

@@ -14,14 +14,15 @@ from jaxtyping import Float, Integer
 
 from pns_common.base_scheme import BaseScheme
 from pns_common.creases import NO_CREASES, Creases, chosen_creases
+from pns_common.directed import DirectedNetworks
 from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.features import FEATURE_SETS
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import Mesh
-from pns_common.model.card import PAPER_FORMAT
+from pns_common.model.card import DIRECTED_FORMAT, PAPER_FORMAT
 from pns_common.model.file import COMPANIONS, companion_of, load_model
-from pns_common.model.session import Model, PolygonModel
-from pns_common.operator import Rule
+from pns_common.model.session import Model, PolygonModel, heads_of, networks
+from pns_common.operator import DirectedRule, Rule
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
 from pns_common.scheme_names import BASE_SCHEMES
@@ -49,7 +50,7 @@ class Scheme:
 
     name: str
     base: BaseScheme = field(default=LOOP, repr=False)
-    rule: Rule | None = field(default=None, repr=False)
+    rule: Rule | DirectedRule | None = field(default=None, repr=False)
     learned_levels: int | None = 0
     creases: Creases = field(default=NO_CREASES, repr=False)
     for_polygons: Callable[[], Scheme] | None = field(default=None, repr=False)
@@ -145,6 +146,8 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
     budget = float(budget)
     named = {"budget": budget, "model": model.name, "model_hash": model.hash}
+    if card.format == DIRECTED_FORMAT:
+        return _directed_scheme(model, budget, named, companion)
     rule = Rule(
         partial(_edges_at_unit_budget, model),
         FEATURE_SETS[card.features],
@@ -182,6 +185,43 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
         for_polygons=companion,
         **named,  # type: ignore[arg-type]
     )
+
+
+def _directed_scheme(
+    model: Model,
+    budget: float,
+    named: dict[str, Any],
+    companion: Callable[[], Scheme] | None,
+) -> Scheme:
+    """Return the scheme of a model of directed edges."""
+    card = model.card
+    if card.base not in BASES:
+        raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
+    encoder, *rounds, heads = (partial(_run, model, each.given) for each in networks(card))
+    levels = int(_given(model, "sharpness_levels"))
+    return Scheme(
+        "pns",
+        BASES[card.base],
+        DirectedRule(
+            DirectedNetworks(
+                encoder, tuple(rounds), heads, int(_given(model, "width")), heads_of(card)
+            ),
+            card.gate_sharpness,
+            _given(model, "vertex_gate_sharpness"),
+            budget,
+            _given(model, "boundary_strength"),
+            _given(model, "network_scale"),
+            _given(model, "fold_angle"),
+        ),
+        learned_levels=1,
+        creases=Creases(learned=True, levels=levels) if budget > 0 and levels else NO_CREASES,
+        for_polygons=companion,
+        **named,
+    )
+
+
+def _run(model: Model, given: str, rows: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N A"]:
+    return model.run(given, rows)
 
 
 def _given(model: Model, name: str) -> float:

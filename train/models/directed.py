@@ -13,6 +13,7 @@ values go by unit, so a mirrored mesh has the mirrored answer for any weights.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -138,7 +139,5 @@ class DirectedNet(nn.Module):
 
 
 def _perceptron(widths: tuple[int, int, int], generator: torch.Generator) -> nn.Sequential:
-    first, second = (
-        _seeded_linear(*pair, generator) for pair in zip(widths[:-1], widths[1:], strict=True)
-    )
+    first, second = (_seeded_linear(*pair, generator) for pair in pairwise(widths))
     return nn.Sequential(first, nn.SiLU(), second)

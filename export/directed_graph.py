@@ -1,0 +1,43 @@
+"""The model file's graph of a network of directed edges: an encoder, its rounds, and the heads."""
+
+from torch import nn
+
+from export.onnx_graph import (
+    Graph,
+    answers_info,
+    array,
+    rows_info,
+    serialised,
+    silu,
+)
+from pns_common.model.card import ModelCard
+from pns_common.model.session import networks
+from train.models.directed import DirectedNet
+
+
+def directed_bytes(network: DirectedNet, card: ModelCard) -> bytes:
+    """Return the model file; tied weights are written as the dense matrices that they make.
+
+    Inputs and outputs are those of ``pns_common.model.session.networks``: each is a network of its
+    own in one graph, and the operator passes messages between them.
+    """
+    graph, held = Graph(), networks(card)
+    layers: list[nn.Module] = [network.encoder, *network.rounds, network.heads]
+    for each, layer in zip(held, layers, strict=True):
+        graph.prefix = f"{each.given}_"
+        linear = [part for part in layer.modules() if isinstance(part, nn.Linear)]
+        value = each.given
+        for index, part in enumerate(linear):
+            weight = graph.constant(f"weight_{index}", array(part.weight))
+            bias = graph.constant(f"bias_{index}", array(part.bias))
+            last = index == len(linear) - 1
+            value = graph.apply(
+                "Gemm", value, weight, bias, output=each.answer if last else "", transB=1
+            )
+            if not last:
+                value = silu(graph, value)
+    inputs = [rows_info(each.given, f"{each.given}_rows", each.columns) for each in held]
+    outputs = [
+        answers_info(each.answer, f"{each.given}_rows", each.answer_columns) for each in held
+    ]
+    return serialised(graph, inputs, outputs, card)
