@@ -10,22 +10,20 @@ with the order of weights around vertices and s of the fold guard held.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from pns_common import Mesh, operator
 from pns_common.base_scheme import BaseScheme, in_threes
-from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
-from pns_common.directed import directed_features
+from pns_common.curves import corner_shares, curve_prior, curve_pushes, find_curves
+from pns_common.directed import DirectedNetworks, directed_features
 from pns_common.kernels import directed as kernels
-from pns_common.kernels import frames
-from pns_common.kernels.connectivity import BOUNDARY, INTERIOR
+from pns_common.kernels.connectivity import INTERIOR
 from pns_common.level import Level
 from pns_common.matrix import subdivision_matrix
 from pns_common.mesh import fans
@@ -34,14 +32,17 @@ from pns_common.refinement import control_level
 from pns_common.schemes.scheme import named_scheme
 from pns_common.sharpness import LEAST_SHARPNESS
 from pns_common.topology import Topology
-from train.fitting.soft_masks import Masks, Spokes, applied
+from train.fitting.soft_masks import Masks, Spokes
 from train.models.directed import Directed, DirectedNet
-from train.models.recipe import DirectedRule
+from train.models.recipe import DirectedForm
 from train.tensors import shortened
 
-LEVELS = 2
-# Corners of boundaries: κ rises from 0 to 1 between these turns, degrees.
-STRAIGHT, CORNER = 45.0, 75.0
+
+def _unasked(rows: np.ndarray) -> np.ndarray:
+    raise AssertionError("what surrounds a network is measured without its answers")
+
+
+_NONE = DirectedNetworks(_unasked, (), _unasked, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class ControlMesh:
         faces: triangles after two levels.
     """
 
-    def __init__(self, mesh: Mesh, rule: DirectedRule):
+    def __init__(self, mesh: Mesh, rule: DirectedForm):
         level = control_level(mesh, named_scheme(rule.base), 1.0, None, threads=1).unmarked
         level.measure(rings=True)
         self.rule, self.base = rule, level.base
@@ -101,27 +102,25 @@ class ControlMesh:
         self.edge_gate = torch.from_numpy(of_edges)
         self.own_gate = torch.from_numpy(np.tanh(rule.gate_sharpness * jumps**2))
         self.corner_edges, self.corners = _long(mesh.corner_edges), _long(mesh.corners)
-        self.corner_faces = torch.from_numpy(np.repeat(np.arange(mesh.face_count), np.diff(mesh.offsets)))
+        self.corner_faces = torch.from_numpy(
+            np.repeat(np.arange(mesh.face_count), np.diff(mesh.offsets))
+        )
         half = np.where(mesh.half_edges >= 0, mesh.half_edges, 0)
         self.sides = _long(mesh.face_of(half.reshape(-1)).reshape(-1, 2))
-        squares = np.bincount(mesh.edges.reshape(-1), np.repeat(lengths**2, 2), mesh.vertex_count)
-        squares /= np.maximum(mesh.valence, 1)
-        all_squares, self.face_normals = [squares, lengths**2], torch.zeros(0, 3)
-        if base.polygons:
-            made = np.empty((mesh.face_count, frames.FACE_MEASURES))
-            of_faces = mesh.corners, mesh.offsets, mesh.corner_edges
-            rows = np.arange(mesh.face_count)
-            frames.measure_face_vertices(
-                level.points,
-                level.rings.fields,
-                *of_faces,
-                *(lengths, jumps, level.edges.bends),
-                *(rows, 0, len(rows), made),
-            )
-            self.face_normals = torch.from_numpy(made[:, :3].copy())
-            all_squares.append(made[:, frames.SQUARE])
-        square = torch.from_numpy(np.concatenate(all_squares))
-        self.bound, self.reach = rule.budget * square, rule.network_scale * square.sqrt()
+        given = rule.gate_sharpness, rule.vertex_gate_sharpness, rule.budget
+        given += rule.curve_strength, rule.network_scale, rule.fold_angle
+        rows = self.base.split(mesh, Blocks(), inherit=False).vertex_count
+        whole = operator.DirectedRule(_NONE, *given)
+        around = operator.surroundings(level, whole, np.zeros((rows, 3)))
+        self.flat = torch.from_numpy(around.flat)
+        self.moved = torch.zeros(rows, 1, dtype=torch.float64)
+        firsts = 0, len(level.points), len(level.points) + len(mesh.edges)
+        for first, at in zip(firsts, around.rows, strict=True):
+            self.moved[_long(at) + first] = 1.0
+        # Those of vertices and edges are for all, in their order.
+        self.bound = torch.from_numpy(np.concatenate(around.bounds))
+        self.reach = rule.network_scale * torch.from_numpy(np.concatenate(around.lengths))
+        self.face_normals = torch.from_numpy(level.normals.copy())
 
     def _measure_boundary(self, level: Level) -> None:
         """Measure what the boundary does by itself: displacements, corners, what it shares."""
@@ -134,8 +133,8 @@ class ControlMesh:
         made *= torch.from_numpy(curves.shares)[:, None]
         self.on_boundary = torch.zeros(rows, 3, dtype=torch.float64)
         self.on_boundary[_long(curves.new_rows)] = made
-        self.corner = torch.from_numpy(boundary_corners(level))
-        self.alone = curves.shared[:count].copy()
+        self.corner = torch.zeros(count, dtype=torch.float64)
+        self.corner[_long(curves.rows)] = torch.from_numpy(corner_shares(curves))
 
     def limit(self, network: DirectedNet | None) -> Limit:
         """Return the limit surface; without a network the base scheme's."""
@@ -155,38 +154,32 @@ class ControlMesh:
         corners = torch.where(self.ringed, own, self.corner)
         spokes = Spokes.of(self.directed, w, corners)
         base = self.masks[0](self.points, spokes, w, self.edges)
-        delta = self._displacement(heads, w, base, spokes)
-        alone = self.alone & (spokes.own_third.detach().numpy() == 0)
-        shared = np.concatenate([alone, self.curves.shared[count:]])
+        delta = self._displacement(heads, w, base)
         scale = operator.guard_scale(
             self.level,
             base.detach().numpy(),
             np.ascontiguousarray(delta.detach().numpy()),
             math.radians(self.rule.fold_angle),
-            replace(self.curves, shared=shared),
+            self.curves,
         )
         first = base + torch.from_numpy(scale)[:, None] * delta
         return Limit(self._limit_of(first, spokes, w), w, corners, float((scale < 1).mean()))
 
     def _displacement(
-        self, heads: Tensor, w: Tensor, base: Float[Tensor, "W 3"], spokes: Spokes
+        self, heads: Tensor, w: Tensor, base: Float[Tensor, "W 3"]
     ) -> Float[Tensor, "W 3"]:
-        count, edges = len(self.points), self.edges
-        turned = torch.einsum("dk,dkj->dj", heads[:, kernels.EDGE : kernels.VERTEX], self.axes)
-        leaving = torch.einsum("dk,dkj->dj", heads[:, kernels.VERTEX : kernels.SHARPNESS], self.axes)
-        asked = [self.directed.mean(leaving), (turned[: len(edges)] + turned[len(edges) :]) / 2]
-        flat = [self.points, self.points[edges].mean(dim=1)]
+        turned, leaving = (
+            torch.einsum("dk,dkj->dj", heads[:, first : first + 3], self.axes)
+            for first in (kernels.EDGE, kernels.VERTEX)
+        )
+        asked = [self.directed.mean(leaving), sum(turned.tensor_split(2)) / 2]
         if self.base.polygons:
             height = self.directed.mean_in_faces(heads[:, [kernels.FACE]])
             asked.append(height * self.face_normals)
-            flat.append(base[count + len(edges) :])  # the mean of the corners
         one = torch.ones((), dtype=torch.float64)
-        wanted = torch.cat(flat) - base
-        wanted = wanted + self.reach[:, None] * shortened(torch.cat(asked), one)
+        wanted = self.flat - base + self.reach[:, None] * shortened(torch.cat(asked), one)
         made = self._gates(w)[:, None] * shortened(wanted, self.bound)
-        on_curve = spokes.second[:, None] - spokes.third[:, None]
-        along = self.on_boundary
-        return made + torch.cat([on_curve * along[:count], along[count:]])
+        return self.moved * made + self.on_boundary
 
     def _gates(self, w: Float[Tensor, " E"]) -> Float[Tensor, " W"]:
         """Return γ of all new vertices: 0 on planes, and where faces are flat within sharp edges."""
@@ -196,8 +189,7 @@ class ControlMesh:
         of_sides = of_faces[self.sides]
         most, least, own = of_sides.amax(dim=1), of_sides.amin(dim=1), self.own_gate
         bent = own * (1 - w + w * most) + (1 - own) * least
-        made = [of_vertices * self.ringed, bent * self.interior]
-        return torch.cat([*made, of_faces] if self.base.polygons else made)
+        return torch.cat([of_vertices, bent, *([of_faces] if self.base.polygons else [])])
 
     def _largest(
         self, values: Tensor, at: Int[Tensor, " H"], to: Int[Tensor, " H"], count: int | None = None
@@ -214,21 +206,6 @@ class ControlMesh:
         made = self.masks[1](first, split, second, self.split_edges)
         last = spokes.of_last(w, second, self.edges, self.split_edges, self.children, self.counts)
         return self.masks[2](made, last)
-
-
-def boundary_corners(level: Level) -> Float[np.ndarray, " V"]:
-    """Return κ of vertices on the boundary: how much of a corner their two boundary edges make."""
-    mesh, points = level.topology, level.points
-    edges = mesh.edges[mesh.edge_class == BOUNDARY].astype(np.int64)
-    along = points[edges[:, 1]] - points[edges[:, 0]]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    sums = np.zeros(points.shape)
-    np.add.at(sums, edges[:, 0], along)
-    np.add.at(sums, edges[:, 1], -along)
-    two = np.bincount(edges.reshape(-1), minlength=len(points)) == 2  # noqa: PLR2004
-    turn = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(sums, axis=1) / 2, 0, 1)))
-    t = np.clip((turn - STRAIGHT) / (CORNER - STRAIGHT), 0, 1)
-    return np.where(two, t * t * (3 - 2 * t), 0.0)
 
 
 def _share(logits: Tensor, gate: Tensor) -> Tensor:

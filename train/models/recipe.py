@@ -83,7 +83,7 @@ class ScaleFree:
 
 
 @dataclass(frozen=True, slots=True)
-class DirectedRule:
+class DirectedForm:
     """The rule of directed edges and its network (format 5), as on the card.
 
     Attributes:
