@@ -7,12 +7,13 @@ p + (a + b − 2 p) / 6. Pushing p the other way, across the curve, undoes that:
 
 with a, b the ends of the two sharpest edges at p, w₂ and w₃ the weights of its second and third
 sharpest (``topology.SharpVertices``), γ_p = tanh(c_v x_p) f(x_p), x_p = 1 − cos of the turning
-angle at p: 0 where the curve is straight, and 0 at corners of a right angle or more. Nothing here
+angle at p: 0 where the curve is straight, and 0 at corners. Nothing here
 reads the surface beside the curve, so two meshes that share a boundary and R move it alike.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,8 @@ from pns_common.kernels import connectivity
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
 from pns_common.topology import Topology
 
-# f falls from 1 where a curve turns by 60 degrees to 0 at 90.
-BEND, CORNER = 1 / 2, 1.0
+# f falls from 1 where a curve turns by 45 degrees to 0 at 75, as 1 − cos does.
+BEND, CORNER = 1 - math.cos(math.radians(45)), 1 - math.cos(math.radians(75))
 TWO = 2
 
 

@@ -74,8 +74,8 @@ def directed_features(level: Level, begin: int, end: int) -> Float32[np.ndarray,
         level.normals,
         rings.fields,
         rings.means,
-        rings.valence,
-        on_border(level),
+        level.logs,
+        _sizes(level),
         mesh.corners,
         mesh.offsets,
         mesh.face_of_corner,
@@ -89,10 +89,22 @@ def directed_features(level: Level, begin: int, end: int) -> Float32[np.ndarray,
     return made
 
 
-def on_border(level: Level) -> np.ndarray:
-    """Return which vertices end an edge that is not between two faces."""
-    counts = level.topology.sharp_count
-    return counts > 0 if len(counts) else np.zeros(len(level.points), dtype=bool)
+def _sizes(level: Level) -> Float[np.ndarray, "V 3"]:
+    """Return the columns of ``kernels.measure_sizes``, made once."""
+    kept = vars(level)
+    if "sizes" not in kept:
+        made, rings, counts = (
+            np.empty((len(level.points), 3)),
+            level.rings,
+            level.topology.sharp_count,
+        )
+        on_border = counts > 0 if len(counts) else np.zeros(len(made), dtype=bool)
+        read = rings.means, rings.valence, on_border
+        level.blocks.quiet().run(
+            len(made), lambda begin, end: kernels.measure_sizes(*read, begin, end, made)
+        )
+        kept["sizes"] = made
+    return kept["sizes"]
 
 
 def answers_of(level: Level, networks: DirectedNetworks) -> Answers:
@@ -116,6 +128,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     mesh, width = level.topology, networks.width
     edges, count = mesh.edges, len(mesh.edges)
     level.measure(rings=True)
+    _ = _sizes(level)
     blocks = level.blocks.of_rows(EDGES_AT_ONCE)
     starts = np.concatenate([[0], np.cumsum(mesh.valence)]).astype(np.int64)
     leaving = np.empty(2 * count, dtype=np.uint32)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pns_common.kernels import inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, previous_corner
 from pns_common.kernels.frames import wing
@@ -22,6 +24,8 @@ EDGE, VERTEX, SHARPNESS, CORNER, FACE = 0, 3, 6, 7, 8
 NO_MEAN = 1e-3
 # Turns, in radians, at which features of the turn saturate; and lengths, in edges.
 TURNS, REACH = (0.3, 0.1), 3.0
+# Stands for the logarithm of 0.
+NO_LOG = -1e300
 
 
 @inlined
@@ -69,13 +73,23 @@ def directed_frame(a, b, n, m, at_a, at_b):
 
 
 @inlined
-def _soft(x):
-    return REACH * math.tanh(x / REACH)
+def _soft(v):
+    """Return 3 tanh(x / 3) of each coordinate."""
+    return (
+        REACH * math.tanh(v[0] / REACH),
+        REACH * math.tanh(v[1] / REACH),
+        REACH * math.tanh(v[2] / REACH),
+    )
 
 
 @inlined
 def _write(features, to, column, x, y, z):
     features[to, column], features[to, column + 1], features[to, column + 2] = x, y, z
+
+
+@inlined
+def _write_turned(features, to, column, v, s):
+    _write(features, to, column, s * v[0], v[1], s * v[2])
 
 
 @inlined
@@ -93,8 +107,8 @@ def directed_features(
     normals,
     fields,
     means,
-    valence,
-    on_border,
+    logs,
+    sizes,
     corners,
     offsets,
     face_of_corner,
@@ -108,8 +122,9 @@ def directed_features(
     """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
 
     Args:
-        fields, means, valence: of the rings, ``kernels.measures``.
-        on_border: (V,) whether a vertex ends an edge that is not interior.
+        fields, means: of the rings, ``kernels.measures``.
+        logs: (E,) logarithms of the edges' lengths.
+        sizes: (V, 3) of ``measure_sizes``.
         features: (2 (end − begin), 28) out.
     """
     count = end - begin
@@ -125,46 +140,61 @@ def directed_features(
         c, d = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if left >= 0:
             to = difference(_opposite(points, left, corners, offsets, face_of_corner), middle)
-            c = dot(to, t) / size, dot(to, up) / size, dot(to, side) / size
+            c = _local(to, t, up, side, size)
         if right >= 0:
             to = difference(_opposite(points, right, corners, offsets, face_of_corner), middle)
-            d = dot(to, t) / size, dot(to, up) / size, dot(to, side) / size
+            d = _local(to, t, up, side, size)
         turn = 0.0
         if left >= 0 and right >= 0 and dot(n, n) > 0 and dot(m, m) > 0:
             turn = 2 * math.atan2(norm(difference(n, m)), norm(sum_of(n, m)))
             if c[1] + d[1] > 0:
                 turn = -turn
-        ca, cb = row(means, a), row(means, b)
         border = 1.0 if edge_class[e] != INTERIOR else 0.0
+        saturated = math.tanh(turn / TURNS[0]), math.tanh(turn / TURNS[1])
+        c, d = _soft(c), _soft(d)
+        m1, m2 = _local(at_a, t, up, side, 1.0), _local(at_b, t, up, side, 1.0)
+        u1 = _soft(_local(row(means, a), t, up, side, size))
+        u2 = _soft(_local(row(means, b), t, up, side, size))
+        r1, r2 = _length_ratio(h, logs[e], sizes, a), _length_ratio(h, logs[e], sizes, b)
         for way in range(2):
             to = there if way == 0 else back
             # The other way round T and B change their signs.
             s = 1.0 - 2.0 * way
-            here, far = (c, d) if way == 0 else (d, c)
             v, w = (a, b) if way == 0 else (b, a)
-            m1, m2 = (at_a, at_b) if way == 0 else (at_b, at_a)
-            u1, u2 = (ca, cb) if way == 0 else (cb, ca)
-            _write(features, to, 0, turn, math.tanh(turn / TURNS[0]), math.tanh(turn / TURNS[1]))
-            _write(features, to, 3, _soft(s * here[0]), _soft(here[1]), _soft(s * here[2]))
-            _write(features, to, 6, _soft(s * far[0]), _soft(far[1]), _soft(s * far[2]))
-            _write(features, to, 9, s * dot(m1, t), dot(m1, up), s * dot(m1, side))
-            _write(features, to, 12, s * dot(m2, t), dot(m2, up), s * dot(m2, side))
-            x, y, z = dot(u1, t) / size, dot(u1, up) / size, dot(u1, side) / size
-            _write(features, to, 15, _soft(s * x), _soft(y), _soft(s * z))
-            x, y, z = dot(u2, t) / size, dot(u2, up) / size, dot(u2, side) / size
-            _write(features, to, 18, _soft(s * x), _soft(y), _soft(s * z))
-            features[to, 21] = _length_ratio(h, means[v, LENGTH])
-            features[to, 22] = _length_ratio(h, means[w, LENGTH])
-            features[to, 23] = math.log(max(valence[v], 1) / 6.0)
-            features[to, 24] = math.log(max(valence[w], 1) / 6.0)
-            features[to, 25] = 1.0 if on_border[v] else 0.0
-            features[to, 26] = 1.0 if on_border[w] else 0.0
+            _write(features, to, 0, turn, saturated[0], saturated[1])
+            _write_turned(features, to, 3, c if way == 0 else d, s)
+            _write_turned(features, to, 6, d if way == 0 else c, s)
+            _write_turned(features, to, 9, m1 if way == 0 else m2, s)
+            _write_turned(features, to, 12, m2 if way == 0 else m1, s)
+            _write_turned(features, to, 15, u1 if way == 0 else u2, s)
+            _write_turned(features, to, 18, u2 if way == 0 else u1, s)
+            _write(features, to, 21, r1 if way == 0 else r2, r2 if way == 0 else r1, sizes[v, 1])
+            _write(features, to, 24, sizes[w, 1], sizes[v, 2], sizes[w, 2])
             features[to, 27] = border
 
 
 @inlined
-def _length_ratio(h, mean):
-    return _soft(math.log(h / mean)) if h > 0 and mean > 0 else 0.0
+def _local(v, t, up, side, size):
+    """Return the coordinates of v / size in a frame."""
+    return dot(v, t) / size, dot(v, up) / size, dot(v, side) / size
+
+
+@inlined
+def _length_ratio(h, log, sizes, v):
+    return REACH * math.tanh((log - sizes[v, 0]) / REACH) if h > 0 and sizes[v, 0] > NO_LOG else 0.0
+
+
+@kernel
+def measure_sizes(means, valence, on_border, begin, end, sizes):
+    """Write logarithms of mean length and of valence / 6, and 1 at borders, of some vertices.
+
+    The first is NO_LOG where there is no length.
+    """
+    for v in range(max(begin, 0), end):
+        mean = means[v, LENGTH]
+        sizes[v, 0] = math.log(mean) if mean > 0 else NO_LOG
+        sizes[v, 1] = math.log(max(valence[v], 1) / 6.0)
+        sizes[v, 2] = 1.0 if on_border[v] else 0.0
 
 
 @kernel
@@ -177,16 +207,18 @@ def pool(states, starts, spokes, begin, end, pooled):
         pooled: (V, 2 W) out; 0 at vertices without edges.
     """
     width = states.shape[1]
+    total = np.empty(width)
     for v in range(max(begin, 0), end):
         first, stop = starts[v], starts[v + 1]
         for k in range(width):
-            total, largest = 0.0, -math.inf
-            for i in range(first, stop):
-                x = states[spokes[i], k]
-                total += x
-                largest = max(largest, x)
-            pooled[v, k] = total / (stop - first) if stop > first else 0.0
-            pooled[v, width + k] = largest if stop > first else 0.0
+            total[k], pooled[v, width + k] = 0.0, -math.inf if stop > first else 0.0
+        for i in range(first, stop):
+            s = spokes[i]
+            for k in range(width):
+                total[k] += states[s, k]
+                pooled[v, width + k] = max(pooled[v, width + k], states[s, k])
+        for k in range(width):
+            pooled[v, k] = total[k] / max(stop - first, 1)
 
 
 @kernel
