@@ -1,6 +1,6 @@
 """Training pairs of real shapes: each simplified by all simplifiers, as it is and changed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,8 @@ from jaxtyping import Float
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import read_mesh, welded
 from train.data.pairs.references import Pair, Reference
-from train.data.remeshers import with_points
-from train.data.simplifiers import SIMPLIFIERS
+from train.data.remeshers import REMESHERS, with_points
+from train.data.simplifiers import SIMPLIFIERS, Simplifier
 from train.metrics.surface_distance import surface_samples
 from train.surfaces.solids import random_rotation
 from train.vectors import face_normals
@@ -35,21 +35,27 @@ NOISY, NOISE = 0.15, 0.06
 CHANGED = 3
 
 
-def shape_pairs(path: Path, kind: str, seed: int) -> Iterator[list[Pair]]:
+def shape_pairs(
+    path: Path, kind: str, seed: int, *, polygons: bool = False
+) -> Iterator[list[Pair]]:
     """Yield pairs of one surface each time: of the shape as it is, then of changed ones.
 
     Args:
         path: dense mesh, in any unit; results have a bounding box of diagonal 1.
         kind: its kind.
         seed: of sizes, changes and noise.
+        polygons: remesh in quads, in place of simplifying.
     """
     rng = np.random.default_rng(seed)
     dense = read_mesh(path)
-    names = list(SIMPLIFIERS)
-    yield _simplified(kind, dense, names, rng)
+    makers = REMESHERS if polygons else SIMPLIFIERS
+    names = list(makers)
+    yield _simplified(kind, dense, makers, names, rng)
     for turn in range(3 if kind == "terrain" else 1):
-        chosen = [names[(seed + CHANGED * turn + 2 * step) % len(names)] for step in range(CHANGED)]
-        yield _simplified(kind, changed(dense, rng, always_cut=kind == "terrain"), chosen, rng)
+        first = seed + CHANGED * turn
+        chosen = [names[(first + 2 * step) % len(names)] for step in range(CHANGED)]
+        other = changed(dense, rng, always_cut=kind == "terrain")
+        yield _simplified(kind, other, makers, chosen, rng)
 
 
 def changed(mesh: Mesh, rng: np.random.Generator, *, always_cut: bool = False) -> Mesh:
@@ -69,7 +75,13 @@ def changed(mesh: Mesh, rng: np.random.Generator, *, always_cut: bool = False) -
         return stretched
 
 
-def _simplified(kind: str, dense: Mesh, names: list[str], rng: np.random.Generator) -> list[Pair]:
+def _simplified(
+    kind: str,
+    dense: Mesh,
+    makers: Mapping[str, Simplifier],
+    names: list[str],
+    rng: np.random.Generator,
+) -> list[Pair]:
     low, high = dense.vertices.min(axis=0), dense.vertices.max(axis=0)
     dense = with_points(dense, (dense.vertices - (low + high) / 2) / np.linalg.norm(high - low))
     surface = sampled_surface(dense, rng)
@@ -80,10 +92,10 @@ def _simplified(kind: str, dense: Mesh, names: list[str], rng: np.random.Generat
         noise = rng.uniform(0, NOISE) if rng.random() < NOISY else 0.0
         try:
             most = max(len(dense.faces) // LEAST_REDUCTION, FEWEST)
-            coarse = clean(SIMPLIFIERS[name](dense, min(faces, most))).mesh
+            coarse = clean(makers[name](dense, min(faces, most))).mesh
         except MeshError:
             continue
-        if len(coarse.faces) >= FEWEST:
+        if coarse.face_count >= FEWEST:
             made.append(Pair(f"{kind}/{name}", _shaken(coarse, noise, rng), surface))
     return made
 
