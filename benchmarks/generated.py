@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common import Mesh
-from pns_common.normals import angle_weighted_normals
+from pns_common.mesh.normals import angle_weighted_normals
 from pns_common.parallel import Blocks
 from service.meshfiles.mesh_file import MeshFile, of_triangles
 

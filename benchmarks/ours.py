@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.peers.protocol import read_mesh, serve
 from pns_common import Mesh, catmull_clark, load_model, loop, pns, refine
-from pns_common.topology import TRIANGLE
+from pns_common.mesh.topology import TRIANGLE
 
 
 def main(name: str, path: str, levels: str) -> None:

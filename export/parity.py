@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 
 from pns_common.errors import ModelError, PnsError
-from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS, Feature
+from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS, Feature
 from pns_common.model.session import OnnxModel
 from train.models.networks import BoundedNet, SharpNet
 

@@ -7,11 +7,10 @@
 
 Where to read:
 
-    operator        the formula, top to bottom; start here
-    schemes/        base schemes, one file each: masks and split; and what ``pns`` makes of a model
-    mesh, topology  faces of any degree; edges, classes, sharpness, splits
-    level           measurements that the operator reads; curves, creases beside it
-    limit, columns  the limit surface; masks on attribute columns
+    operator/       formula, top to bottom: start here; what ``pns`` makes of a model
+    schemes/        base schemes, one file each: masks, limit masks, split
+    mesh/           faces of any degree; edges, classes, creases, normals, selections
+    carry/          what vertices and corners carry, refined with the mesh
     kernels/        compiled loops over elements
     model/          card, file, session: what a model is, and onnxruntime, which runs it
     refinement      all levels; report beside it
@@ -26,34 +25,34 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pns_common.creases import Creases
     from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
     from pns_common.interop.subdivide import subdivide
-    from pns_common.mesh import Mesh, clean
+    from pns_common.mesh.creases import Creases
+    from pns_common.mesh.mesh import Mesh, clean
     from pns_common.model.file import load_model
+    from pns_common.operator.scheme import Scheme, catmull_clark, loop, pns
+    from pns_common.operator.sharpness import sharp_edges
     from pns_common.refinement import Refinement, refine, refine_many
-    from pns_common.schemes import Scheme, catmull_clark, loop, pns
-    from pns_common.sharpness import sharp_edges
     from pns_common.version import VERSION as __version__  # noqa: N811
     from pns_common.warming import warm_up
 
 _HOMES = {
-    "Creases": "creases",
-    "Mesh": "mesh",
+    "Creases": "mesh.creases",
+    "Mesh": "mesh.mesh",
     "MeshError": "errors",
     "ModelError": "errors",
     "ParameterError": "errors",
     "PnsError": "errors",
     "Refinement": "refinement",
-    "Scheme": "schemes",
-    "catmull_clark": "schemes",
-    "clean": "mesh",
+    "Scheme": "operator.scheme",
+    "catmull_clark": "operator.scheme",
+    "clean": "mesh.mesh",
     "load_model": "model.file",
-    "loop": "schemes",
-    "pns": "schemes",
+    "loop": "operator.scheme",
+    "pns": "operator.scheme",
     "refine": "refinement",
     "refine_many": "refinement",
-    "sharp_edges": "sharpness",
+    "sharp_edges": "operator.sharpness",
     "subdivide": "interop.subdivide",
     "warm_up": "warming",
 }

@@ -15,9 +15,9 @@ import numpy as np
 import pyvista
 
 from pns_common.interop.subdivide import subdivide
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
+from pns_common.operator.scheme import Scheme, loop
 from pns_common.refinement import DEFAULT_LEVELS
-from pns_common.schemes import Scheme, loop
 
 
 @pyvista.register_dataset_accessor("pns", pyvista.PolyData)

@@ -11,21 +11,23 @@ from typing import Any, Literal, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.creases import Creases, chosen_creases
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.kernels import loop as kernels
-from pns_common.level import Level
-from pns_common.limit import limit_normals, limit_positions, limit_shift
-from pns_common.matrix import SubdivisionMatrix, subdivision_matrix
 from pns_common.memory import keep_freed_memory, memory_here
-from pns_common.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
-from pns_common.operator import Additions, DirectedRule, directed_level, learned_level
+from pns_common.mesh.creases import Creases, chosen_creases
+from pns_common.mesh.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
+from pns_common.mesh.quads import QUAD
+from pns_common.mesh.reference_length import measure_reference_length
+from pns_common.mesh.selection import Selected, chosen_faces, select
+from pns_common.mesh.topology import TRIANGLE, Topology
+from pns_common.operator.formula import Additions, DirectedRule, directed_level, learned_level
+from pns_common.operator.level import Level
+from pns_common.operator.scheme import NAMES, Scheme, named_scheme
+from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
 from pns_common.progress import Progress
-from pns_common.quads import QUAD
-from pns_common.reference_length import measure_reference_length
 from pns_common.report import (
     LevelReport,
     Report,
@@ -34,10 +36,8 @@ from pns_common.report import (
     limit_distances,
     longest,
 )
-from pns_common.schemes import NAMES, Scheme, named_scheme
-from pns_common.selection import Selected, chosen_faces, select
-from pns_common.sharpness import with_sharp_edges
-from pns_common.topology import TRIANGLE, Topology
+from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
+from pns_common.schemes.matrix import SubdivisionMatrix, subdivision_matrix
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
 # No refinement takes less for a face that it makes.

@@ -12,9 +12,9 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
 from pns_common.kernels import quads as of_quads
-from pns_common.operator import Additions
+from pns_common.mesh.topology import EdgeClass, Topology
+from pns_common.operator.formula import Additions
 from pns_common.parallel import Blocks
-from pns_common.topology import EdgeClass, Topology
 
 # A gate above this counts as active.
 GATE_ACTIVE = 0.01

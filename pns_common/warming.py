@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from pns_common.kernels import are_compiled
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
 from pns_common.model.file import load_model
+from pns_common.operator.scheme import catmull_clark, loop, pns
 from pns_common.progress import compiling
 from pns_common.refinement import refine
-from pns_common.schemes import catmull_clark, loop, pns
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], dtype=float)
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.creases import Creases, edge_cosines
-from pns_common.mesh import Mesh
+from pns_common.mesh.creases import Creases, edge_cosines
+from pns_common.mesh.mesh import Mesh
 from pns_common.report import LevelReport
 
 # Plane faces in single precision turn by less.

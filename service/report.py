@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pns_common.operator.scheme import Scheme
 from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
-from pns_common.schemes import Scheme
 
 from .advice import NO_BENDS, Bends, advice_on
 from .errors import shortened, shortened_pointer

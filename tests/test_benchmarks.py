@@ -12,7 +12,7 @@ from benchmarks.contest import ROOT, Case, as_installed, contest, ours
 from benchmarks.generated import ORDERS, unrolled_torus
 from benchmarks.peers.protocol import read_mesh, write_mesh
 from pns_common import load_model, pns, refine
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.mesh.topology import EdgeClass, build_topology
 from service.meshfiles.mesh_file import NORMAL, UV
 
 

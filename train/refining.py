@@ -15,7 +15,7 @@ from torch import Tensor
 
 from pns_common import Mesh, Scheme, load_model, loop, sharp_edges
 from pns_common import refine as refine_by_library
-from pns_common.reference_length import measure_reference_length
+from pns_common.mesh.reference_length import measure_reference_length
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask, loop_mask
 from train.reference import Step, Surroundings

@@ -14,14 +14,14 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
-from pns_common.creases import Creases
 from pns_common.errors import ParameterError
-from pns_common.mesh import Mesh
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.rows import distinct_rows, number_by_first_appearance
+from pns_common.mesh.topology import Topology, check_vertices
+from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks
 from pns_common.refinement import Refinement, refine
-from pns_common.rows import distinct_rows, number_by_first_appearance
-from pns_common.schemes import Scheme
-from pns_common.topology import Topology, check_vertices
 
 # The children of a face, by its corners a, b, c (0, 1, 2) and edge vertices ab, bc, ca (3, 4, 5).
 CHILDREN = np.array([(0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)])

@@ -8,8 +8,8 @@ import numpy as np
 
 from pns_common.errors import MeshError
 from pns_common.interop.carried import CarriedMesh
-from pns_common.mesh import fans
-from pns_common.quads import QUAD
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.quads import QUAD
 
 
 def read_meshio(mesh: Any) -> CarriedMesh:

@@ -16,10 +16,10 @@ from pns_common.interop.of_meshio import read_meshio, triangulated_meshio, write
 from pns_common.interop.of_open3d import read_open3d, write_open3d
 from pns_common.interop.of_pyvista import read_pyvista, write_pyvista
 from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
 from pns_common.model.file import load_model
+from pns_common.operator.scheme import Scheme, pns
 from pns_common.refinement import DEFAULT_LEVELS, refine, scheme_for
-from pns_common.schemes import Scheme, pns
 
 AnyMesh = TypeVar("AnyMesh")
 Kind = TypeVar("Kind")

@@ -14,7 +14,7 @@ from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from pns_common.features import (
+from pns_common.model.features import (
     DIRECTED_28,
     FACE_FEATURE_SETS,
     FEATURE_SETS,

@@ -1,18 +1,7 @@
-"""Schemes: what ``refine`` applies. A base scheme is one file here; a learned rule adds to it."""
+"""Base schemes, one file each: masks, limit masks, split; the matrix that they make."""
 
-from pns_common.base_scheme import BaseScheme
+from pns_common.schemes.base_scheme import BaseScheme
 from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
-from pns_common.schemes.scheme import NAMES, Scheme, catmull_clark, loop, named_scheme, pns
 
-__all__ = [
-    "CATMULL_CLARK",
-    "LOOP",
-    "NAMES",
-    "BaseScheme",
-    "Scheme",
-    "catmull_clark",
-    "loop",
-    "named_scheme",
-    "pns",
-]
+__all__ = ["CATMULL_CLARK", "LOOP", "BaseScheme"]

@@ -36,12 +36,9 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base_scheme import WIDTH
 from pns_common.kernels import catmull_clark as kernels
 from pns_common.kernels import loop
-from pns_common.parallel import Blocks
-from pns_common.schemes.catmull_clark_masks import place
-from pns_common.sectors import (
+from pns_common.mesh.sectors import (
     CLOSED,
     CORNER,
     CURVE,
@@ -53,7 +50,10 @@ from pns_common.sectors import (
     sector_kinds,
     walked_arrays,
 )
-from pns_common.topology import NO_WEIGHTS, Topology
+from pns_common.mesh.topology import NO_WEIGHTS, Topology
+from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import WIDTH
+from pns_common.schemes.catmull_clark_masks import place
 
 CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.

@@ -19,11 +19,11 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base_scheme import WIDTH, in_threes
 from pns_common.kernels import catmull_clark as kernels
 from pns_common.kernels import loop
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import WIDTH, in_threes
 
 
 def place(

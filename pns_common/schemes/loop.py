@@ -23,12 +23,12 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float
 
-from pns_common.base_scheme import WIDTH, BaseScheme, Limit, in_threes
 from pns_common.kernels import loop as kernels
+from pns_common.mesh.topology import Topology, split_triangles
 from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import WIDTH, BaseScheme, Limit, in_threes
 from pns_common.schemes.loop_limit import limit_normals, limit_positions
 from pns_common.schemes.loop_weights import beta, limit_ring_weight
-from pns_common.topology import Topology, split_triangles
 
 KEPT = 64
 

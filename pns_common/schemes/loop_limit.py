@@ -36,12 +36,9 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.base_scheme import WIDTH
 from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
-from pns_common.parallel import Blocks
-from pns_common.schemes.loop_weights import beta, limit_ring_weight
-from pns_common.sectors import (
+from pns_common.mesh.sectors import (
     CLOSED,
     CORNER,
     CURVE,
@@ -53,7 +50,10 @@ from pns_common.sectors import (
     sector_kinds,
     walked_arrays,
 )
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
+from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import WIDTH
+from pns_common.schemes.loop_weights import beta, limit_ring_weight
 
 CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 # Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.

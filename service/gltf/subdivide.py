@@ -7,7 +7,7 @@ from itertools import chain
 from typing import Any
 
 from pns_common.model.session import Model
-from pns_common.schemes import Scheme, catmull_clark, named_scheme, pns
+from pns_common.operator.scheme import Scheme, catmull_clark, named_scheme, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
 from ..course import Course

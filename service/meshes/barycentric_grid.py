@@ -13,9 +13,9 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.mesh.topology import build_topology, split_faces
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import build_topology, split_faces
 
 # The triangles of a quad, and of one whose corners run the other way round.
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

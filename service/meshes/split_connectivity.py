@@ -12,15 +12,15 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.grid import (
+from pns_common.carry.grid import (
     blend_along,
     blend_inside,
     move_to_vertices,
     number_points,
     take_points,
 )
+from pns_common.mesh.topology import build_topology
 from pns_common.parallel import Blocks, available_threads
-from pns_common.topology import build_topology
 
 from .barycentric_grid import BarycentricGrid
 

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.columns import level_topologies
-from pns_common.creases import NO_CREASES, Creases
+from pns_common.carry.columns import level_topologies
+from pns_common.mesh.creases import NO_CREASES, Creases
+from pns_common.mesh.rows import as_words, distinct_rows, number_by_first_appearance
+from pns_common.mesh.topology import EdgeClass, Topology, following
 from pns_common.parallel import Blocks, available_threads
-from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
 from pns_common.schemes import LOOP, BaseScheme
-from pns_common.topology import EdgeClass, Topology, following
 
 from ..options import Options
 from .barycentric_grid import at_quad_points

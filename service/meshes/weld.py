@@ -15,8 +15,8 @@ from itertools import pairwise, product
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.reference_length import measure_reference_length
-from pns_common.rows import distinct_rows, number_by_first_appearance
+from pns_common.mesh.reference_length import measure_reference_length
+from pns_common.mesh.rows import distinct_rows, number_by_first_appearance
 
 # Cells are counted in int64; a tolerance below this part of the largest coordinate joins nothing
 # that float32 can tell apart.

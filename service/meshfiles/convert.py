@@ -20,8 +20,8 @@ from pns_common import load_model
 from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.model.session import Model
+from pns_common.operator.scheme import Scheme
 from pns_common.progress import compiling
-from pns_common.schemes import Scheme
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles, folder_of

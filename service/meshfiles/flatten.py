@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from pns_common.rows import disjoint_faces, unit
+from pns_common.mesh.rows import disjoint_faces, unit
 
 from ..errors import GltfError, UnrefinableError, check_limit
 from ..gltf.constants import FLOAT, SURFACES, TRIANGLES

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh import fans, repeated_vertex
-from pns_common.rows import distinct_rows, marked
+from pns_common.mesh.mesh import fans, repeated_vertex
+from pns_common.mesh.rows import distinct_rows, marked
 
 from ..errors import UnreadableError, UnrefinableError
 from ..gltf.read.plan import check_memory

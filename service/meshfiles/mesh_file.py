@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from pns_common.matrix import SubdivisionMatrix
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ..report import Change
 

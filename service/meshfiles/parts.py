@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.matrix import SubdivisionMatrix
-from pns_common.rows import distinct_rows, marked, number_by_first_appearance, unit
+from pns_common.mesh.rows import distinct_rows, marked, number_by_first_appearance, unit
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ..gltf.constants import FLOAT
 from ..gltf.read.primitives import TrianglePrimitive

@@ -2,7 +2,7 @@
 
 Values at corners follow the split of the faces that they are at: those of one vertex with one value
 stay one, so seams stay seams. Where some faces are refined alone, all are, and of the others only
-the corners are kept that `pns_common.selection` keeps.
+the corners are kept that `pns_common.mesh.selection` keeps.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Int
 
-from pns_common.columns import level_topologies
-from pns_common.creases import Creases
-from pns_common.mesh import Mesh, fans
-from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
+from pns_common.carry.columns import level_topologies
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.mesh import Mesh, fans
+from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
+from pns_common.mesh.rows import distinct_rows, dot, number_by_first_appearance
+from pns_common.mesh.topology import following
+from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine
 from pns_common.report import Report
-from pns_common.rows import distinct_rows, dot, number_by_first_appearance
-from pns_common.schemes import CATMULL_CLARK, Scheme
-from pns_common.topology import following
+from pns_common.schemes import CATMULL_CLARK
 
 from ..advice import Bends, count_bends
 from ..course import Course

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pns_common.errors import MeshError
-from pns_common.mesh import fans
-from pns_common.rows import marked
-from pns_common.schemes import Scheme
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.rows import marked
+from pns_common.operator.scheme import Scheme
 
 from ..course import Course
 from ..errors import UnrefinableError, check_limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.rows import cross, norm
+from pns_common.mesh.rows import cross, norm
 
 from ..errors import UnreadableError
 from ..report import Change

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh import fans
-from pns_common.rows import cross, dot, norm
-from pns_common.topology import following
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.rows import cross, dot, norm
+from pns_common.mesh.topology import following
 
 from ..report import Change
 from .mesh_file import MeshFile, offsets_of

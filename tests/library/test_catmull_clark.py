@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop
-from pns_common.columns import level_topologies, refine_columns
-from pns_common.matrix import subdivision_matrix
+from pns_common.carry.columns import level_topologies, refine_columns
+from pns_common.mesh.quads import split_quads
+from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
-from pns_common.quads import split_quads
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.schemes.matrix import subdivision_matrix
 from tests.support import opensubdiv
 from tests.support.control_points import refine
 from tests.support.meshes import bent, manifolds

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, catmull_clark, refine
-from pns_common.columns import level_topologies, refine_columns
-from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.carry.columns import level_topologies, refine_columns
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.schemes import catmull_clark_limit as masks
+from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
 from tests.support import opensubdiv
 from tests.support.meshes import bent
 from tests.support.polygons import (

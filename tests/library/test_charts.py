@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, ParameterError
-from pns_common.charts import refine_corners
+from pns_common.carry.charts import refine_corners
 from pns_common.schemes import CATMULL_CLARK, LOOP
 from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere

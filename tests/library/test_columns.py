@@ -6,16 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns
-from pns_common.columns import (
+from pns_common.carry.columns import (
     ColumnRefinement,
     level_topologies,
     refine_columns,
 )
-from pns_common.limit import limit_positions
-from pns_common.matrix import subdivision_matrix
+from pns_common.mesh.topology import build_topology
+from pns_common.operator.scheme import catmull_clark
 from pns_common.parallel import Blocks
-from pns_common.schemes import LOOP, catmull_clark
-from pns_common.topology import build_topology
+from pns_common.schemes import LOOP
+from pns_common.schemes.limit import limit_positions
+from pns_common.schemes.matrix import subdivision_matrix
 from tests.support.control_points import refine
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
 

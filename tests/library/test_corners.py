@@ -6,12 +6,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, ParameterError, catmull_clark, load_model, loop, pns
-from pns_common.charts import refine_corners
-from pns_common.columns import refine_columns
+from pns_common.carry.charts import refine_corners
+from pns_common.carry.columns import refine_columns
 from pns_common.interop.carried import CarriedMesh, refine_carried
-from pns_common.limit import limit_positions
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
+from pns_common.schemes.limit import limit_positions
 from tests.support import opensubdiv
 from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, ParameterError, load_model, loop, pns, refine, sharp_edges
+from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
-from pns_common.topology import EdgeClass, build_topology
 from tests.support.meshes import bumpy_sphere, grid, manifolds, prism, soups
 
 seeds = st.integers(0, 2**31)

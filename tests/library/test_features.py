@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh
-from pns_common.features import (
+from pns_common.mesh.topology import build_topology
+from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
+from pns_common.model.features import (
     EDGE_GROUPS,
     FEATURE_SETS,
     HALF_TURN,
@@ -17,12 +19,10 @@ from pns_common.features import (
     FeatureSet,
     symmetries,
 )
-from pns_common.level import Level
-from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
-from pns_common.operator import Rule, edge_inputs, vertex_inputs
+from pns_common.operator.formula import Rule, edge_inputs, vertex_inputs
+from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
-from pns_common.topology import build_topology
 from tests.support.meshes import bumpy_sphere
 
 SETS = {**FEATURE_SETS, **RING_FEATURE_SETS}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common import grid
+from pns_common.carry import grid
 from pns_common.parallel import Blocks
 
 # Points in the order corner 0, 1, 2, then the middles of edges (a, b), (b, c), (c, a), then one

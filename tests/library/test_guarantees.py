@@ -6,9 +6,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop, pns
-from pns_common.operator import edge_inputs
+from pns_common.mesh.topology import EdgeClass, build_topology
+from pns_common.operator.formula import edge_inputs
 from pns_common.refinement import control_level
-from pns_common.topology import EdgeClass, build_topology
 from tests.support.control_points import refine
 from tests.support.meshes import (
     axis_planes,

@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases
-from pns_common.columns import level_topologies, refine_columns
-from pns_common.limit import limit_normals, limit_positions, limit_shift
-from pns_common.normals import face_normals
+from pns_common.carry.columns import level_topologies, refine_columns
+from pns_common.mesh.normals import face_normals
+from pns_common.mesh.sectors import find_sectors
+from pns_common.mesh.topology import build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
+from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
 from pns_common.schemes.loop_limit import dart_tangents, dart_weights
-from pns_common.sectors import find_sectors
-from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, manifolds, soups
 
 

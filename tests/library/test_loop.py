@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, loop
+from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.schemes.loop_weights import beta as loop_beta
-from pns_common.topology import EdgeClass, build_topology
 from tests.support.control_points import refine
 from tests.support.meshes import (
     TETRAHEDRON,

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common.kernels.normals import angle_between
-from pns_common.normals import angle_weighted_normals, perpendicular_tangents, smooth_fans
+from pns_common.mesh.normals import angle_weighted_normals, perpendicular_tangents, smooth_fans
+from pns_common.mesh.rows import number_by_first_appearance, unit
 from pns_common.parallel import Blocks
-from pns_common.rows import number_by_first_appearance, unit
 from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, soups
 
 BLOCKS = Blocks(threads=2, rows=100)

@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, catmull_clark, pns
-from pns_common.columns import level_topologies
-from pns_common.limit import limit_positions
-from pns_common.operator import edge_inputs, face_inputs, pushes, vertex_inputs
+from pns_common.carry.columns import level_topologies
+from pns_common.mesh.topology import EdgeClass
+from pns_common.operator.formula import edge_inputs, face_inputs, pushes, vertex_inputs
 from pns_common.refinement import control_level
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import EdgeClass
+from pns_common.schemes.limit import limit_positions
 from tests.support.control_points import refine
 from tests.support.meshes import bent, manifolds, rotation
 from tests.support.networks import DEFAULT_CARD, TiedPolygonModel, polygon_model
@@ -164,7 +164,7 @@ def test_planes_give_catmull_clark(model):
 
 def reached(mesh, rim):
     """New vertices after two levels that a vertex on the rim reaches."""
-    from pns_common.columns import refine_columns
+    from pns_common.carry.columns import refine_columns
 
     topologies = level_topologies(mesh.polygons, len(mesh.vertices), 2, base=CATMULL_CLARK)
     return refine_columns(rim[:, None].astype(float), topologies, CATMULL_CLARK)[:, 0] > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, pns
-from pns_common.operator import edge_inputs
+from pns_common.operator.formula import edge_inputs
 from pns_common.refinement import control_level
 from tests.support.control_points import refine
 from tests.support.networks import (

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import pns_common
 from pns_common import Mesh, MeshError, Scheme, loop, parallel, pns, refine, refine_many
+from pns_common.mesh.topology import build_topology
 from pns_common.model.session import Model
 from pns_common.schemes import LOOP
-from pns_common.topology import build_topology
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pns_common import rows as module
-from pns_common.rows import (
+from pns_common.mesh import rows as module
+from pns_common.mesh.rows import (
     cross,
     disjoint_faces,
     distinct_rows,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, MeshError, ModelError, Scheme, load_model, loop, pns, refine
-from pns_common.base_scheme import BaseScheme
+from pns_common.mesh.topology import split_triangles
 from pns_common.model.file import bundled_models
-from pns_common.topology import split_triangles
+from pns_common.schemes.base_scheme import BaseScheme
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.networks import Float64Model, default_model, random_layers, sharpening_model
 from tests.support.polygons import mixed_cube

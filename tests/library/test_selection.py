@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ParameterError, load_model, loop, pns, subdivide
-from pns_common.topology import EdgeClass
+from pns_common.mesh.topology import EdgeClass
 from tests.support.control_points import refine
 from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
 from tests.support.polygons import SHAPES, polygon_manifolds, quad_grid, uneven

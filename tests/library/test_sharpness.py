@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, ModelError, loop, pns, sharp_edges, sharpness
-from pns_common.features import SIGNED_18
-from pns_common.level import Level
-from pns_common.operator import Rule
+from pns_common import Mesh, ModelError, loop, pns, sharp_edges
+from pns_common.mesh.topology import build_topology
+from pns_common.model.features import SIGNED_18
+from pns_common.operator import sharpness
+from pns_common.operator.formula import Rule
+from pns_common.operator.level import Level
+from pns_common.operator.sharpness import creases_by_name, learned_sharpness, sharpness_inputs
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
-from pns_common.sharpness import creases_by_name, learned_sharpness, sharpness_inputs
-from pns_common.topology import build_topology
 from tests.support.control_points import refine
 from tests.support.meshes import (
     block,

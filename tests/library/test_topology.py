@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import ParameterError
+from pns_common.mesh.topology import EdgeClass, _sort_edges, build_topology, split_triangles
 from pns_common.parallel import Blocks
-from pns_common.topology import EdgeClass, _sort_edges, build_topology, split_triangles
 from tests.support.meshes import bow_tie, grid, manifolds, soups, three_pages
 
 CLASSES = EdgeClass.INTERIOR, EdgeClass.BOUNDARY, EdgeClass.IRREGULAR

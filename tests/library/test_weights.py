@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pns_common.carry.weights import keep_heaviest, scale_rows, whole_units
 from pns_common.parallel import Blocks
-from pns_common.weights import keep_heaviest, scale_rows, whole_units
 
 BLOCKS = Blocks(threads=2, rows=7)
 

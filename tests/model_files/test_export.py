@@ -17,7 +17,7 @@ from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
 from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity, check_sharpness
 from pns_common import ModelError
-from pns_common.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
+from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
 from tests.support.networks import CARD, DEFAULT_CARD
 from train.metrics.card import TO_LIMIT

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.mesh.topology import EdgeClass, build_topology
 from service.bodies.sibling_files import folder_of
 from service.errors import ServiceError
 from service.gltf.subdivide import subdivide_gltf

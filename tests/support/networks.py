@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from pns_common.features import FACE_8, RING_10, SIGNED_18
 from pns_common.model.card import (
     CARD_KEY,
     EDGE_FEATURES,
@@ -15,6 +14,7 @@ from pns_common.model.card import (
     VERTEX_FEATURES,
     ModelCard,
 )
+from pns_common.model.features import FACE_8, RING_10, SIGNED_18
 from pns_common.model.file import model_from_bytes
 
 PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0

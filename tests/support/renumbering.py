@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from pns_common import Mesh, clean
-from pns_common.reference_length import measure_reference_length
-from pns_common.topology import build_topology
+from pns_common.mesh.reference_length import measure_reference_length
+from pns_common.mesh.topology import build_topology
 from tests.support.shared import shared_path
 
 # One of each kind, by their edges.

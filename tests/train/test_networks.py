@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ParameterError, pns
-from pns_common.features import FEATURE_SETS, RING_10
+from pns_common.model.features import FEATURE_SETS, RING_10
 from tests.support.control_points import refine
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds
 from tests.support.networks import DEFAULT_CARD

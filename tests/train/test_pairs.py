@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pns_common import Mesh
-from pns_common.normals import measure_faces
+from pns_common.mesh.normals import measure_faces
+from pns_common.mesh.reference_length import measure_reference_length
 from pns_common.parallel import Blocks
-from pns_common.reference_length import measure_reference_length
 from train.connectivity import connect
 from train.data.pairs import references as subject
 from train.data.pairs.faceted import faceted_pair

@@ -7,13 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from pns_common.curves import find_curves
-from pns_common.features import FEATURE_SETS
-from pns_common.level import Level
-from pns_common.operator import Rule, edge_inputs, learned_level, vertex_inputs
+from pns_common.mesh.topology import build_topology, split_triangles
+from pns_common.model.features import FEATURE_SETS
+from pns_common.operator.curves import find_curves
+from pns_common.operator.formula import Rule, edge_inputs, learned_level, vertex_inputs
+from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
-from pns_common.topology import build_topology, split_triangles
 from train.connectivity import Connectivity, connect
 from train.data.primitives import icosphere
 from train.loop_masks import Mask, limit_mask, loop_mask
@@ -93,7 +93,7 @@ def test_edges_faces_and_rings_agree(both):
 
 
 def test_loop_and_its_limit_agree(both):
-    from pns_common.limit import limit_positions
+    from pns_common.schemes.limit import limit_positions
 
     _, level, points, mesh = both
     topology = level.topology

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common import Mesh
-from pns_common.features import FEATURE_SETS, RING_10
+from pns_common.model.features import FEATURE_SETS, RING_10
 from train.certificates.learned_once import largest_turn
 from train.connectivity import Connectivity, connect
 from train.loop_masks import limit_mask

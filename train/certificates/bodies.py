@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from pns_common import Mesh, MeshError, clean
-from pns_common.reference_length import measure_reference_length
+from pns_common.mesh.reference_length import measure_reference_length
 from train.data.datasets import draw_ridges, grid_faces, jittered_grid
 from train.spectra.stars import quad_star, star
 

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from pns_common import Mesh
 from pns_common.kernels.connectivity import INTERIOR
-from pns_common.normals import measure_faces
+from pns_common.mesh.normals import measure_faces
 from pns_common.parallel import Blocks
 from train.data.pairs.references import Pair, Reference, Segments
 from train.vectors import angle, dot, norm, unit

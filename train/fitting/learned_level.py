@@ -17,19 +17,20 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from pns_common import Mesh, Scheme, operator
-from pns_common.base_scheme import BaseScheme
-from pns_common.curves import Curves, find_curves
-from pns_common.features import FEATURE_SETS
+from pns_common import Mesh, Scheme
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR
-from pns_common.level import Level
-from pns_common.matrix import subdivision_matrix
+from pns_common.mesh.topology import Topology
+from pns_common.model.features import FEATURE_SETS
+from pns_common.operator import formula
+from pns_common.operator.curves import Curves, find_curves
+from pns_common.operator.level import Level
+from pns_common.operator.scheme import named_scheme
+from pns_common.operator.sharpness import LEAST_SHARPNESS, sharpness_inputs
 from pns_common.parallel import Blocks
 from pns_common.refinement import control_level
-from pns_common.schemes.scheme import named_scheme
-from pns_common.sharpness import LEAST_SHARPNESS, sharpness_inputs
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import BaseScheme
+from pns_common.schemes.matrix import subdivision_matrix
 from train.curve_rule import curve_push
 from train.data.batch import joined_meshes
 from train.fitting.sharp_masks import Sharpness, around_vertices, of_children, placed
@@ -135,7 +136,7 @@ class LearnedLevel:
         # Where another edge is a little sharp, the boundary places no vertex alone.
         shared = self.curves.shared.copy()
         shared[: len(self.points)] &= sharp.third.detach().numpy() == 0
-        scale = operator.guard_scale(
+        scale = formula.guard_scale(
             self.level,
             base.detach().numpy(),
             delta.detach().numpy(),
@@ -192,7 +193,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         ParameterError: the recipe is not scale-free.
     """
     form, vertex_rule = scale_free_parts(recipe)
-    rule = operator.Rule(
+    rule = formula.Rule(
         edge_network=_not_asked,
         seen=FEATURE_SETS[recipe.features],
         symmetric=True,
@@ -203,15 +204,15 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         prior_strength=None,
         network_scale=form.network_scale,
     )
-    unit_prior = operator.Rule(**{**vars(rule), "prior_strength": 1.0})
+    unit_prior = formula.Rule(**{**vars(rule), "prior_strength": 1.0})
     mesh, scheme = joined_meshes(meshes), named_scheme(form.base)
     level = control_level(mesh, scheme, 1.0, None, threads=1)
     topology, base = level.topology, level.base
     split = base.split(topology, Blocks(), inherit=False)
     edges = topology.edges.astype(np.int64)
-    at_edges = operator.edge_inputs(level, rule, topology.interior)
-    at_vertices = operator.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
-    at_faces = operator.face_inputs(level, rule, np.arange(topology.face_count * base.polygons))
+    at_edges = formula.edge_inputs(level, rule, topology.interior)
+    at_vertices = formula.vertex_inputs(level, rule, np.flatnonzero(level.ringed))
+    at_faces = formula.face_inputs(level, rule, np.arange(topology.face_count * base.polygons))
     psi, cap = _psi(meshes, scheme, vertex_rule.gate_sharpness)
     split_edges = torch.from_numpy(split.edges.astype(np.int64))
     low, high = split_edges.T
@@ -240,7 +241,7 @@ def learned_level(meshes: Sequence[Mesh], recipe: Recipe) -> LearnedLevel:
         at_edges=_inputs(at_edges),
         at_vertices=_inputs(at_vertices),
         at_faces=_inputs(at_faces),
-        push=torch.from_numpy(operator.pushes(level, unit_prior)),
+        push=torch.from_numpy(formula.pushes(level, unit_prior)),
         numbers={
             "budget": recipe.budget,
             "strength": form.prior_strength,
@@ -267,7 +268,7 @@ def _psi(
     return np.concatenate(psi), np.concatenate(cap)
 
 
-def _inputs(at: operator.Inputs) -> Inputs:
+def _inputs(at: formula.Inputs) -> Inputs:
     rows, gate = torch.from_numpy(at.rows.astype(np.int64)), torch.from_numpy(at.gate)
     axes = torch.from_numpy(at.basis).reshape(-1, 3, 3).transpose(1, 2)
     bound, reach = torch.from_numpy(at.bound), torch.from_numpy(at.reach)

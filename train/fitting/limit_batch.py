@@ -10,10 +10,10 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from pns_common.base_scheme import BaseScheme, in_threes
-from pns_common.mesh import fans
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import BaseScheme, in_threes
 from train.data.pairs.references import Pair
 from train.data.remeshers import with_points
 from train.data.sharp_labels import coarse_sharp_edges

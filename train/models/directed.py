@@ -20,8 +20,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from pns_common.features import DIRECTED_28, Symmetries
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
+from pns_common.model.features import DIRECTED_28, Symmetries
 from train.models.networks import _seeded_linear
 from train.models.tied import _Invariant, _Repeated, _tie, _TiedFirst, _TiedHidden, _TiedLast
 

@@ -10,7 +10,7 @@ import torch
 from onnx import numpy_helper
 
 from pns_common import ParameterError, load_model
-from pns_common.features import (
+from pns_common.model.features import (
     FACE_FEATURE_SETS,
     FEATURE_SETS,
     RING_FEATURE_SETS,

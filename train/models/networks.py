@@ -10,13 +10,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pns_common.features import Symmetries
 from pns_common.model.card import (
     EDGE_FEATURES,
     FACE_FEATURES,
     SHARPNESS_FEATURES,
     VERTEX_FEATURES,
 )
+from pns_common.model.features import Symmetries
 
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 from torch.nn.utils import parametrize
 
-from pns_common.features import Symmetries
+from pns_common.model.features import Symmetries
 from train.models.networks import BoundedNet
 
 

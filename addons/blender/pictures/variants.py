@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
-from pns_common.features import SIGNED_18
-from pns_common.operator import Rule, pushes
+from pns_common.mesh.topology import build_topology
+from pns_common.model.features import SIGNED_18
+from pns_common.operator.formula import Rule, pushes
 from pns_common.refinement import control_level
-from pns_common.topology import build_topology
 
 # N1 asks no network: pushes of strength 1 alone.
 N1 = Rule(

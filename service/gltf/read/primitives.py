@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.rows import as_words, distinct_rows, marked, number_by_first_appearance
+from pns_common.mesh.rows import as_words, distinct_rows, marked, number_by_first_appearance
 
 from ...errors import GltfError, UnsupportedFeature
 from ..constants import FAN, FLOAT, NGONS, TRIANGLES

@@ -13,10 +13,10 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.grid import rounded_rows
-from pns_common.normals import opposed_corners, perpendicular_tangents
+from pns_common.carry.grid import rounded_rows
+from pns_common.mesh.normals import opposed_corners, perpendicular_tangents
+from pns_common.mesh.rows import cross, dot, marked, unit
 from pns_common.parallel import Blocks, available_threads
-from pns_common.rows import cross, dot, marked, unit
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid

@@ -8,10 +8,10 @@ from math import ceil
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.normals import opposed_corners
+from pns_common.mesh.normals import opposed_corners
+from pns_common.mesh.rows import dot, extent
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks, available_threads
-from pns_common.rows import dot, extent
-from pns_common.topology import Topology
 
 from ...meshes.weld import near_labels
 from ...report import Change

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.columns import ColumnRefinement
+from pns_common.carry.columns import ColumnRefinement
+from pns_common.carry.weights import keep_heaviest, scale_rows, whole_units
+from pns_common.mesh.rows import as_words, distinct_rows
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks, available_threads
-from pns_common.rows import as_words, distinct_rows
 from pns_common.schemes import LOOP, BaseScheme
-from pns_common.topology import Topology
-from pns_common.weights import keep_heaviest, scale_rows, whole_units
 
 from ...course import Course
 from ...meshes.weld import canonical_zero

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from pns_common.grid import index_type, take_points
-from pns_common.mesh import Cleaned, Mesh, clean, repeated_vertex
-from pns_common.rows import distinct_rows, dot, norm, unit
+from pns_common.carry.grid import index_type, take_points
+from pns_common.mesh.mesh import Cleaned, Mesh, clean, repeated_vertex
+from pns_common.mesh.rows import distinct_rows, dot, norm, unit
 
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import blocks_of

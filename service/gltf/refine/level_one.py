@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.creases import Creases
-from pns_common.mesh import Cleaned, Mesh
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.mesh import Cleaned, Mesh
+from pns_common.mesh.rows import marked
+from pns_common.mesh.topology import build_topology, halves_of
 from pns_common.parallel import Blocks
-from pns_common.rows import marked
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import build_topology, halves_of
 
 from ...course import Course
 from ...meshes.barycentric_grid import HALVES, barycentric_grid

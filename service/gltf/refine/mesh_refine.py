@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.columns import level_topologies
-from pns_common.creases import NO_CREASES, Creases, edge_cosines
+from pns_common.carry.columns import level_topologies
 from pns_common.errors import MeshError
-from pns_common.matrix import SubdivisionMatrix
-from pns_common.mesh import Mesh
+from pns_common.mesh.creases import NO_CREASES, Creases, edge_cosines
+from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.rows import disjoint_faces, extent
+from pns_common.mesh.topology import Topology, split_faces
+from pns_common.operator.scheme import Scheme
+from pns_common.operator.sharpness import creases_by_name
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import Refinement, refine, refine_many
 from pns_common.report import Report
-from pns_common.rows import disjoint_faces, extent
-from pns_common.schemes import Scheme
-from pns_common.sharpness import creases_by_name
-from pns_common.topology import Topology, split_faces
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...course import Course
 from ...errors import UnrefinableError

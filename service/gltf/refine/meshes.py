@@ -9,9 +9,9 @@ from itertools import accumulate
 
 import numpy as np
 
-from pns_common.matrix import SubdivisionMatrix
+from pns_common.operator.scheme import Scheme
 from pns_common.progress import LEARNED_COST
-from pns_common.schemes import Scheme
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, count_bends
 from ...course import Course

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.creases import edge_cosines
-from pns_common.normals import smooth_fans
-from pns_common.rows import marked
-from pns_common.topology import build_topology
+from pns_common.mesh.creases import edge_cosines
+from pns_common.mesh.normals import smooth_fans
+from pns_common.mesh.rows import marked
+from pns_common.mesh.topology import build_topology
 
 from ...options import Options
 from ..constants import FLOAT

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pns_common.grid import rounded_rows
-from pns_common.normals import ONE_TRIANGLE, angle_weighted_normals
+from pns_common.carry.grid import rounded_rows
+from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals
+from pns_common.mesh.rows import cross, dot, marked, norm, number_by_first_appearance, unit
+from pns_common.mesh.topology import EdgeClass, Topology
 from pns_common.parallel import Blocks, available_threads, no_progress
-from pns_common.rows import cross, dot, marked, norm, number_by_first_appearance, unit
-from pns_common.topology import EdgeClass, Topology
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid

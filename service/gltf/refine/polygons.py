@@ -19,11 +19,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common.kernels.connectivity import pair_up
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.rows import cross, distinct_rows, dot, norm, unit
+from pns_common.mesh.topology import Topology, build_topology, following
 from pns_common.parallel import Blocks
-from pns_common.rows import cross, distinct_rows, dot, norm, unit
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.topology import Topology, build_topology, following
 
 from ...meshes.barycentric_grid import at_quad_points
 from ...meshes.weld import canonical_zero

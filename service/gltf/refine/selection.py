@@ -1,4 +1,4 @@
-"""Refine the faces of one material or group alone, as `pns_common.selection` describes."""
+"""Refine the faces of one material or group alone, as `pns_common.mesh.selection` describes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
-from pns_common.mesh import Mesh
-from pns_common.selection import transitions
+from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.selection import transitions
 
 from ...errors import UnrefinableError
 from ...meshes.barycentric_grid import BarycentricGrid

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.creases import Creases
 from pns_common.errors import MeshError
-from pns_common.matrix import SubdivisionMatrix
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.rows import disjoint_faces
+from pns_common.operator.scheme import Scheme
 from pns_common.report import Report
-from pns_common.rows import disjoint_faces
-from pns_common.schemes import Scheme
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, Bends, count_bends
 from ...course import Course

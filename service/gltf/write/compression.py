@@ -11,7 +11,7 @@ import meshopt
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from pns_common.rows import extent
+from pns_common.mesh.rows import extent
 
 from ...course import Course
 from ...report import Change

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.rows import marked
+from pns_common.mesh.rows import marked
 
 from ..read.extensions import References, accessor_references, view_references
 from ..read.plan import Spare

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
-from pns_common.matrix import SubdivisionMatrix
+from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...report import Change
 from ..constants import FAN, FLOAT, NGONS, STRIP, SURFACES

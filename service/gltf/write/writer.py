@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from pns_common.rows import extent
+from pns_common.mesh.rows import extent
 
 from ...course import Course
 from ...report import Change

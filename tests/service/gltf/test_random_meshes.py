@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common.mesh import Mesh, clean
+from pns_common.mesh.mesh import Mesh, clean
+from pns_common.operator.scheme import loop
 from pns_common.refinement import refine
-from pns_common.schemes import loop
 from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
 from service.options import Limits, Options

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
+from pns_common.operator.scheme import loop
 from pns_common.refinement import refine
-from pns_common.schemes import loop
 from service.meshes.weld import weld
 from tests.service.gltf.subdivided import corner_positions, subdivide
 from tests.support.gltf import files

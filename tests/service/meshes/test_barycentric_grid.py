@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pns_common.mesh.topology import build_topology, split_faces
 from pns_common.parallel import Blocks
-from pns_common.topology import build_topology, split_faces
 from service.meshes.barycentric_grid import barycentric_grid
 from service.meshes.split_connectivity import split_connectivity
 

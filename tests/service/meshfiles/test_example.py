@@ -7,7 +7,7 @@ import io
 import numpy as np
 import trimesh
 
-from pns_common.topology import EdgeClass, build_topology
+from pns_common.mesh.topology import EdgeClass, build_topology
 from service.meshes.weld import weld
 from service.meshfiles.example import part, part_glb
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common.schemes import loop
+from pns_common.operator.scheme import loop
 from service.bodies import media
 from service.errors import LimitError, UnreadableError, UnrefinableError
 from service.gltf.subdivide import subdivide_gltf

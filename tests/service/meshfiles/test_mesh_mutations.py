@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from pns_common.errors import PnsError
-from pns_common.schemes import loop
+from pns_common.operator.scheme import loop
 from service.errors import ServiceError
 from service.meshfiles import formats
 from service.meshfiles.convert import converted

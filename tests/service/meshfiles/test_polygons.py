@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, load_model, refine
-from pns_common.schemes import catmull_clark
+from pns_common.operator.scheme import catmull_clark
 from service.errors import InvalidParameter, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.convert import Written, converted

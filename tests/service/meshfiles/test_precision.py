@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pns_common.mesh import Mesh
+from pns_common.mesh.mesh import Mesh
+from pns_common.operator.scheme import loop
 from pns_common.refinement import refine
-from pns_common.schemes import loop
 from service.errors import UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.formats import rounding_changes

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pns_common.reference_length import measure_reference_length
+from pns_common.mesh.reference_length import measure_reference_length
 from train.data.pairs.faceted import faceted_pair
 from train.data.pairs.grid import grid_pair
 from train.data.pairs.lathe import lathe_pair

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from pns_common import Mesh, MeshError, catmull_clark, refine
 from pns_common.kernels.connectivity import pair_up
-from pns_common.topology import EdgeClass
+from pns_common.mesh.topology import EdgeClass
 from train.connectivity import connect, next_corner
 from train.data.pairs.faceted import block, faceted_pair
 from train.data.pairs.grid import grid_pair, vertex_normals

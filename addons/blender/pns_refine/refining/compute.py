@@ -9,13 +9,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Creases, Scheme, loop, pns, sharp_edges
-from pns_common.creases import NO_CREASES
-from pns_common.limit import limit_positions
+from pns_common.mesh.creases import NO_CREASES
+from pns_common.mesh.topology import EdgeClass, Topology
 from pns_common.model.file import COMPANIONS, companion_of
 from pns_common.model.session import Model
+from pns_common.operator.scheme import named_scheme
 from pns_common.parallel import Blocks, available_threads
-from pns_common.schemes import named_scheme
-from pns_common.topology import EdgeClass, Topology
+from pns_common.schemes.limit import limit_positions
 
 from .corners import refine_corners
 from .edges import edge_parents

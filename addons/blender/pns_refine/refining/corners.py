@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
+from pns_common.mesh.rows import first_places
+from pns_common.mesh.topology import Topology, build_topology, halves_of
 from pns_common.parallel import Blocks
-from pns_common.rows import first_places
 from pns_common.schemes import BaseScheme
-from pns_common.topology import Topology, build_topology, halves_of
 
 from .snapshot import Smoothing, edge_keys
 from .steps import one_level, straight_level, with_creases

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import Creases, Mesh, Refinement, Scheme, refine
-from pns_common.limit import limit_normals, limit_positions, limit_shift
+from pns_common.mesh.reference_length import measure_reference_length
+from pns_common.mesh.topology import Topology
+from pns_common.operator.scheme import named_scheme
 from pns_common.parallel import Blocks, available_threads
-from pns_common.reference_length import measure_reference_length
-from pns_common.schemes import named_scheme
-from pns_common.topology import Topology
+from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
 
 from .steps import Steps
 

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Int, Shaped
 
 from pns_common import Creases, Scheme
-from pns_common.creases import NO_CREASES
-from pns_common.sharpness import creases_by_name
-from pns_common.topology import Topology
+from pns_common.mesh.creases import NO_CREASES
+from pns_common.mesh.topology import Topology
+from pns_common.operator.sharpness import creases_by_name
 
 from .snapshot import Control, Domain, Snapshot, edge_keys
 

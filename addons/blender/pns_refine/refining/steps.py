@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common.creases import NO_CREASES, Creases
+from pns_common.mesh.creases import NO_CREASES, Creases
+from pns_common.mesh.topology import Topology, halves_of
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import BaseScheme
-from pns_common.topology import Topology, halves_of
 
 from .snapshot import edge_keys
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Shaped
 
-from pns_common.matrix import subdivision_matrix
 from pns_common.schemes import BaseScheme
+from pns_common.schemes.matrix import subdivision_matrix
 
 from .steps import Steps
 

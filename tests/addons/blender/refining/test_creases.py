@@ -13,12 +13,12 @@ from addons.blender.pns_refine.refining.steps import (
     refine_columns,
 )
 from pns_common import Creases, Mesh, catmull_clark, load_model, loop, pns
-from pns_common.columns import level_topologies
-from pns_common.columns import refine_columns as refine_by_library
+from pns_common.carry.columns import level_topologies
+from pns_common.carry.columns import refine_columns as refine_by_library
+from pns_common.mesh.topology import build_topology
 from pns_common.model.file import DEFAULT_MODEL
+from pns_common.operator.sharpness import creases_by_name
 from pns_common.schemes import CATMULL_CLARK, LOOP
-from pns_common.sharpness import creases_by_name
-from pns_common.topology import build_topology
 from tests.addons.blender.quads import cube, cut, grid
 from tests.support.control_points import refine
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common.rows import number_by_first_appearance
+from pns_common.mesh.rows import number_by_first_appearance
 from service.gltf.refine.control_mesh import joined_normals
 from service.gltf.refine.normals import safe_unit
 

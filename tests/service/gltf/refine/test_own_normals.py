@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pns_common import load_model
-from pns_common.normals import opposed_corners
+from pns_common.mesh.normals import opposed_corners
 from pns_common.parallel import Blocks
 from service.gltf.refine.normals import own_shares
 from service.gltf.subdivide import subdivide_gltf

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pns_common import Mesh, loop, refine
+from pns_common.carry.weights import whole_units
 from pns_common.parallel import Blocks
-from pns_common.weights import whole_units
 from service.course import Course
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model
-from pns_common.columns import ColumnRefinement
+from pns_common.carry.columns import ColumnRefinement
 from service.course import Course
 from service.gltf.read.plan import MeshPlan
 from service.gltf.refine import meshes, together

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.base_scheme import BaseScheme
-from pns_common.creases import Creases
 from pns_common.kernels import connectivity, measures
 from pns_common.kernels.frames import SHORTEST
-from pns_common.normals import NO_AREAS, measure_faces
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.normals import NO_AREAS, measure_faces
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import BaseScheme
 
 
 @dataclass(frozen=True, eq=False)

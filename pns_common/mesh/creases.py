@@ -10,10 +10,10 @@ from jaxtyping import Float, Integer
 
 from pns_common.errors import ParameterError
 from pns_common.kernels import measures
-from pns_common.normals import measure_faces
+from pns_common.mesh.normals import measure_faces
+from pns_common.mesh.topology import MOSTLY_SHARP, Topology, check_vertices
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
-from pns_common.topology import MOSTLY_SHARP, Topology, check_vertices
 
 HALF_TURN = 180
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of

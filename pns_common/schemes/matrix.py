@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.base_scheme import BaseScheme
 from pns_common.kernels import matrix as kernels
+from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import BaseScheme
 
 # Colours that go through the masks at once: two columns each.
 TOGETHER = 12

@@ -41,14 +41,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.curves import Curves, curve_prior, curve_pushes, find_curves
-from pns_common.directed import DirectedNetworks, answers_of
 from pns_common.errors import ModelError, ParameterError
-from pns_common.features import FeatureSet
 from pns_common.kernels import children, correction, frames, measures, quads
 from pns_common.kernels.connectivity import INTERIOR
-from pns_common.level import Level
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
+from pns_common.model.features import FeatureSet
+from pns_common.operator.curves import Curves, curve_prior, curve_pushes, find_curves
+from pns_common.operator.directed import DirectedNetworks, answers_of
+from pns_common.operator.level import Level
 
 # Rows of each call of a network: fixed, so that answers do not depend on threads; one chunk.
 NETWORK_ROWS = 4096

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import MeshError, ParameterError
+from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology, build_topology
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75

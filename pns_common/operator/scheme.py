@@ -12,22 +12,22 @@ from typing import Any, Literal, cast
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.base_scheme import BaseScheme
-from pns_common.creases import NO_CREASES, Creases, chosen_creases
-from pns_common.directed import DirectedNetworks
 from pns_common.errors import MeshError, ModelError, ParameterError
-from pns_common.features import FEATURE_SETS
-from pns_common.matrix import subdivision_matrix
-from pns_common.mesh import Mesh
+from pns_common.mesh.creases import NO_CREASES, Creases, chosen_creases
+from pns_common.mesh.mesh import Mesh
 from pns_common.model.card import DIRECTED_FORMAT, PAPER_FORMAT
+from pns_common.model.features import FEATURE_SETS
 from pns_common.model.file import COMPANIONS, companion_of, load_model
 from pns_common.model.session import Model, PolygonModel, heads_of, networks
-from pns_common.operator import DirectedRule, Rule
+from pns_common.operator.directed import DirectedNetworks
+from pns_common.operator.formula import DirectedRule, Rule
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
 from pns_common.scheme_names import BASE_SCHEMES
+from pns_common.schemes.base_scheme import BaseScheme
 from pns_common.schemes.catmull_clark import CATMULL_CLARK
 from pns_common.schemes.loop import LOOP
+from pns_common.schemes.matrix import subdivision_matrix
 
 BASES: dict[str, BaseScheme] = {name: resolve_name(place) for name, place in BASE_SCHEMES.items()}
 NAMES = (*BASES, "pns")

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Integer
 
 from pns_common.errors import ParameterError
-from pns_common.rows import marked
-from pns_common.topology import Topology, following
+from pns_common.mesh.rows import marked
+from pns_common.mesh.topology import Topology, following
 
 SIDES = 3
 

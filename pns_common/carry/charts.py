@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Real
 
-from pns_common.base_scheme import BaseScheme
 from pns_common.errors import ParameterError
+from pns_common.mesh.rows import as_words, distinct_rows, number_by_first_appearance
+from pns_common.mesh.topology import EdgeClass, Topology, build_topology
 from pns_common.parallel import Blocks
-from pns_common.rows import as_words, distinct_rows, number_by_first_appearance
+from pns_common.schemes.base_scheme import BaseScheme
 from pns_common.schemes.loop import LOOP
-from pns_common.topology import EdgeClass, Topology, build_topology
 
 
 def refine_corners(

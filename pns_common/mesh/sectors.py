@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
 from pns_common.kernels import limit as kernels
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
 
 CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
 

@@ -17,7 +17,7 @@ from jaxtyping import Float, Float32
 
 from pns_common.errors import ModelError
 from pns_common.kernels import directed as kernels
-from pns_common.level import Level
+from pns_common.operator.level import Level
 
 # Edges of one call of a network, both ways: a chunk of rows.
 EDGES_AT_ONCE = 2048

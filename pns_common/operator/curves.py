@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import connectivity
 from pns_common.kernels.loop import CURVE_CENTRE, CURVE_NEIGHBOUR, MIDPOINT
-from pns_common.topology import Topology
+from pns_common.mesh.topology import Topology
 
 # f falls from 1 where a curve turns by 45 degrees to 0 at 75, as 1 − cos does.
 BEND, CORNER = 1 - math.cos(math.radians(45)), 1 - math.cos(math.radians(75))

@@ -18,24 +18,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.creases import Creases
-from pns_common.curves import corner_shares, find_curves
-from pns_common.directed import answers_of
 from pns_common.kernels import sharpness as kernels
-from pns_common.level import Level
-from pns_common.mesh import Mesh, check_is_mesh
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.mesh import Mesh, check_is_mesh
+from pns_common.mesh.normals import measure_faces
+from pns_common.mesh.topology import Topology
 from pns_common.model.file import load_model
-from pns_common.normals import measure_faces
-from pns_common.operator import (
+from pns_common.operator.curves import corner_shares, find_curves
+from pns_common.operator.directed import answers_of
+from pns_common.operator.formula import (
     NETWORK_ROWS,
     DirectedRule,
     Rule,
     checked_answers,
     directed_gates,
 )
+from pns_common.operator.level import Level
+from pns_common.operator.scheme import Scheme, loop, pns
 from pns_common.parallel import Blocks
-from pns_common.schemes import Scheme, loop, pns
-from pns_common.topology import Topology
 
 # Below 1, since what is marked as sharp for good changes the features of corrections beside it.
 SHARPEST = 1 - 2.0**-52

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Integer
 
 from pns_common.kernels import quads as kernels
+from pns_common.mesh.topology import NO_WEIGHTS, Topology, build_topology, inheriting
 from pns_common.parallel import Blocks
-from pns_common.topology import NO_WEIGHTS, Topology, build_topology, inheriting
 
 QUAD = kernels.QUAD
 

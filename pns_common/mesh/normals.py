@@ -7,8 +7,8 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
+from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
-from pns_common.topology import Topology, build_topology
 
 NO_AREAS = np.zeros((0, 4))
 # A face that is one triangle.

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Real
 
-from pns_common.base_scheme import BaseScheme
-from pns_common.creases import NO_CREASES, Creases
 from pns_common.errors import MeshError, ParameterError
-from pns_common.limit import limit_positions
-from pns_common.mesh import as_polygons
+from pns_common.mesh.creases import NO_CREASES, Creases
+from pns_common.mesh.mesh import as_polygons
+from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import BaseScheme
+from pns_common.schemes.limit import limit_positions
 from pns_common.schemes.loop import LOOP
-from pns_common.topology import Topology, build_topology
 
 
 def level_topologies(

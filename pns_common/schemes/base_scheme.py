@@ -9,9 +9,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Integer
 
+from pns_common.mesh.sectors import LimitNormals
+from pns_common.mesh.topology import Topology, split_faces
 from pns_common.parallel import Blocks
-from pns_common.sectors import LimitNormals
-from pns_common.topology import Topology, split_faces
 
 WIDTH = 3
 Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]

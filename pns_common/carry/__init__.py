@@ -1,0 +1,1 @@
+"""Attributes of vertices and corners, refined with the mesh that carries them."""

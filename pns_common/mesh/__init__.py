@@ -1,0 +1,1 @@
+"""Meshes: faces of any degree, edges and their classes, creases, normals, selections."""
