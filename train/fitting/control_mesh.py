@@ -18,20 +18,21 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pns_common import Mesh, operator
-from pns_common.base_scheme import BaseScheme, in_threes
-from pns_common.curves import corner_shares, curve_prior, curve_pushes, find_curves
-from pns_common.directed import DirectedNetworks, directed_features
+from pns_common import Mesh
 from pns_common.kernels import directed as kernels
 from pns_common.kernels.connectivity import INTERIOR
-from pns_common.level import Level
-from pns_common.matrix import subdivision_matrix
-from pns_common.mesh import fans
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.topology import Topology
+from pns_common.operator import formula
+from pns_common.operator.curves import corner_shares, curve_prior, curve_pushes, find_curves
+from pns_common.operator.directed import DirectedNetworks, directed_features
+from pns_common.operator.level import Level
+from pns_common.operator.scheme import named_scheme
+from pns_common.operator.sharpness import LEAST_SHARPNESS
 from pns_common.parallel import Blocks
 from pns_common.refinement import control_level
-from pns_common.schemes.scheme import named_scheme
-from pns_common.sharpness import LEAST_SHARPNESS
-from pns_common.topology import Topology
+from pns_common.schemes.base_scheme import BaseScheme, in_threes
+from pns_common.schemes.matrix import subdivision_matrix
 from train.fitting.soft_masks import Masks, Spokes
 from train.models.directed import Directed, DirectedNet
 from train.models.recipe import DirectedForm
@@ -94,8 +95,8 @@ class ControlMesh:
         self.level = Level(level.points, topology, level.base, 1.0, level.blocks)
 
     def _measure_gates(self, level: Level) -> None:
-        mesh, rule, base = level.topology, self.rule, self.base
-        jumps, lengths = level.edges.jumps, level.edges.lengths
+        mesh, rule = level.topology, self.rule
+        jumps = level.edges.jumps
         of_edges = np.tanh(rule.vertex_gate_sharpness * jumps)
         self.interior = torch.from_numpy(mesh.edge_class == INTERIOR)
         self.ringed = torch.from_numpy(np.array(level.ringed))
@@ -110,8 +111,8 @@ class ControlMesh:
         given = rule.gate_sharpness, rule.vertex_gate_sharpness, rule.budget
         given += rule.curve_strength, rule.network_scale, rule.fold_angle
         rows = self.base.split(mesh, Blocks(), inherit=False).vertex_count
-        whole = operator.DirectedRule(_NONE, *given)
-        around = operator.surroundings(level, whole, np.zeros((rows, 3)))
+        whole = formula.DirectedRule(_NONE, *given)
+        around = formula.surroundings(level, whole, np.zeros((rows, 3)))
         self.flat = torch.from_numpy(around.flat)
         self.moved = torch.zeros(rows, 1, dtype=torch.float64)
         firsts = 0, len(level.points), len(level.points) + len(mesh.edges)
@@ -155,7 +156,7 @@ class ControlMesh:
         spokes = Spokes.of(self.directed, w, corners)
         base = self.masks[0](self.points, spokes, w, self.edges)
         delta = self._displacement(heads, w, base)
-        scale = operator.guard_scale(
+        scale = formula.guard_scale(
             self.level,
             base.detach().numpy(),
             np.ascontiguousarray(delta.detach().numpy()),
@@ -182,7 +183,7 @@ class ControlMesh:
         return self.moved * made + self.on_boundary
 
     def _gates(self, w: Float[Tensor, " E"]) -> Float[Tensor, " W"]:
-        """Return γ of all new vertices: 0 on planes, and where faces are flat within sharp edges."""
+        """Return γ of all new vertices: 0 on planes, and in flat faces within sharp edges."""
         of_edges = torch.where(self.interior, (1 - w) * self.edge_gate, 0.0)
         of_faces = self._largest(of_edges, self.corner_edges, self.corner_faces)
         of_vertices = self._largest(of_faces, self.corner_faces, self.corners, len(self.points))

@@ -1,4 +1,4 @@
-"""A coarse mesh and its surface, ready to train on: distances and normals over the base scheme's."""
+"""A coarse mesh and its surface: distances and normals over the base scheme's."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from pns_common import Mesh
-from pns_common.reference_length import measure_reference_length
+from pns_common.mesh.reference_length import measure_reference_length
 from train.data.pair_store import StoredPairs
 from train.fitting.control_mesh import ControlMesh
 from train.models.recipe import DirectedForm
