@@ -1,7 +1,9 @@
-# Build: a virtual environment with nothing that is not pinned by hash; no torch, no compiler.
+# Build: a virtual environment with nothing that is not pinned by hash; no torch. Debian's C compiler links the loops,
+# and stays behind.
 FROM python:3.13.14-slim-bookworm@sha256:67a1e1f215ccda113cfc024e8639049257e88f273898f595b61476d128d387e8 AS build
 ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
+RUN apt-get update && apt-get install --yes --no-install-recommends gcc libc6-dev && rm -r /var/lib/apt/lists/*
 RUN python3 -m venv /opt/pns && python3 -m venv /opt/build
 COPY requirements requirements
 RUN /opt/build/bin/python -m pip install --require-hashes -r requirements/build.txt \
@@ -19,20 +21,13 @@ RUN (cd pns_common/models && sha256sum --check --strict SHA256SUMS) \
  && /opt/build/bin/cyclonedx-py environment /opt/pns/bin/python --output-reproducible --of JSON -o /opt/pns/sbom.cdx.json \
  && /opt/pns/bin/python -m pip uninstall --yes --quiet setuptools pip \
  && find /opt/pns/lib -type d \( -name test -o -name tests -o -name transformers -o -name f2py \
-      -o -path '*/onnx/reference' -o -path '*/onnxruntime/quantization' -o -path '*/onnxruntime/tools' \
-      -o -path '*/numba/cuda' \) \
+      -o -path '*/onnx/reference' -o -path '*/onnxruntime/quantization' -o -path '*/onnxruntime/tools' \) \
       -prune -exec rm -r {} + \
  && find /opt/pns/lib -regextype posix-extended -type f \
       -regex '.*(\.(pyi|pxd|h|c|cc|cpp|a|proto)|/pygments/lexers/(__pycache__/)?([a-z]|_.*_b)[^/]*)' -delete \
  && rm -r /opt/pns/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.* \
       /opt/pns/bin/draco_* /opt/pns/include /opt/pns/share
-# Kernels for any processor of the architecture, not only the one that builds.
-ENV NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=
-# From elsewhere than /src, whose package would be compiled instead of the installed one. Sources get a time of
-# whole seconds: compiled code is kept for a source of one time, and layers keep no fractions.
-RUN find /opt/pns/lib -path '*pns_common*' -name '*.py' -exec touch --date 2020-01-01 {} + \
- && cd / && export NUMBA_CACHE_DIR=/opt/pns/kernels \
- && /opt/pns/bin/python -m pns_common.warming && /opt/pns/bin/pns doctor
+RUN cd / && /opt/pns/bin/pns doctor
 
 # Run: the environment alone, as a user without a name, on a root that may be read-only.
 FROM python:3.13.14-slim-bookworm@sha256:67a1e1f215ccda113cfc024e8639049257e88f273898f595b61476d128d387e8
@@ -42,9 +37,6 @@ COPY --from=build /opt/pns /opt/pns
 # that no worker's end gives back: with all of them a job of PNS_MEMORY has room, and two that take
 # what was predicted where clients do not hold so much. With a larger --memory, raise these.
 ENV PATH=/opt/pns/bin:$PATH \
-    NUMBA_CPU_NAME=generic \
-    NUMBA_CPU_FEATURES= \
-    NUMBA_CACHE_DIR=/tmp/pns-kernels \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     OMP_NUM_THREADS=1 \
@@ -63,6 +55,4 @@ STOPSIGNAL SIGTERM
 # Not urllib, which asks the proxy that Docker may name in the environment of its containers.
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-c", "import os, http.client as h; c = h.HTTPConnection('127.0.0.1', os.environ['PNS_PORT'], timeout=4); c.request('GET', '/healthz'); exit(c.getresponse().status != 200)"]
-# numba reads compiled code from a folder that it may write alone, so it is copied to one: two megabytes.
-ENTRYPOINT ["sh", "-c", "cp -r /opt/pns/kernels \"$NUMBA_CACHE_DIR\"; exec \"$@\"", "--"]
 CMD ["pns", "serve"]

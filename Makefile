@@ -18,6 +18,10 @@ export PIP_CONSTRAINT := file://$(subst $() ,%20,$(CURDIR))/constraints.txt
 # What has one maintainer is pinned by hash, and first.
 HASHED := --quiet --no-deps --require-hashes --requirement requirements/meshopt.txt
 
+# The loops, and the module that they are compiled into.
+LOOPS := $(wildcard pns_common/kernels/*.py pns_common/kernels/*.c)
+COMPILED := pns_common/kernels/compiled.abi3.so
+
 # A file's tests run in one process: what they share, a service say, is started once. Files come in
 # the order of tests/conftest.py.
 PROCESSES ?= 2
@@ -25,9 +29,7 @@ PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist l
 
 .PHONY: prose size bench bench-answers hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
 
-# The kernels are compiled first, and again after a change: the first request would wait for them.
 serve: $(SERVE)/.ready
-	@$(SERVE)/bin/python -m service.warming
 	@$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
 
 # Tests wait now and then, for processes that start and clients that stall: the checks, of one core, take
@@ -53,9 +55,11 @@ lint: $(DEV)/.ready size
 prose: $(DEV)/.ready
 	$(DEV)/bin/python docs/prose.py
 
-# Once, where two test processes and every service that they start would each compile them.
-kernels: $(DEV)/.ready
-	@$(DEV)/bin/python -m pns_common.warming
+# Half a minute, again after each change of a loop.
+kernels: $(COMPILED)
+
+$(COMPILED): $(LOOPS) | $(DEV)/.ready
+	$(DEV)/bin/python setup.py --quiet build_ext --inplace
 
 # Of each test of pns_common the first parameters, with the shapes of arrays checked.
 shapes: kernels
@@ -146,15 +150,15 @@ paper-hero: $(DEV)/.ready $(BLENDER)-5.0/.ready build/blender-site/.ready
 	  -o docs/blender-paper.png --field distance --highest 0.1 --label 'Distance from the ridge' > /dev/null
 
 build/blender-site/.ready: $(DEV)/.ready constraints.txt
-	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig numba llvmlite onnxruntime
+	$(DEV)/bin/python -m pip install --quiet --no-deps --upgrade --target build/blender-site jaxtyping wadler-lindig onnxruntime
 	touch $@
 
 # The Blender extension, packed and validated by Blender's own tool: dist/pns_refine-VERSION-PLATFORM-pythonX.Y.zip.
-# BPY_PLATFORM names another than this machine's: linux-x64, windows-x64 or macos-arm64.
+# BPY_PLATFORM names another than this machine's (linux-x64, windows-x64 or macos-arm64), and LIBRARY its wheel.
 addon: addon-5.0
 
 addon-%: $(DEV)/.ready $(BLENDER)-%/.ready
-	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM)
+	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM) $(LIBRARY)
 
 # The newest zip for a version's Python.
 ZIP_FOR = $$(ls -t "$(CURDIR)"/dist/pns_refine-*-$$(basename "$$(readlink -f $(BLENDER)-$(1)/bin/python)").zip | head -1)
@@ -187,12 +191,13 @@ web/node_modules/.ready: web/package-lock.json
 	cd web && npm ci --ignore-scripts --no-audit --no-fund
 	touch $@
 
-# Inference only: no torch.
-$(SERVE)/.ready: pyproject.toml setup.py constraints.txt
-	@echo "Installing into $(SERVE), once: some 500 MB, a minute or two"
+# Inference only: no torch. Without a C compiler say JIT=1, and numba compiles at the first request.
+comma := ,
+$(SERVE)/.ready: pyproject.toml setup.py constraints.txt $(LOOPS)
+	@echo "Installing into $(SERVE), once: some 260 MB, a minute or two; the loops are compiled meanwhile"
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store]'
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store$(if $(JIT),$(comma)jit)]'
 	touch $@
 
 # The generator of Python clients, for their test.
@@ -231,12 +236,10 @@ constraints:
 # peers are built where Debian's packages can be had; a peer that cannot be set up is left out by name.
 # Ours runs in the environment of `make serve`, as users have it; BENCH holds further options.
 bench: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/.ready
-	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks --python $(SERVE)/bin/python $(BENCH)
 
 # Files answered a second on one core, beside other programs: half a minute for each of six rows.
 bench-answers: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/node/.ready
-	$(SERVE)/bin/python -m pns_common.warming
 	$(DEV)/bin/python -m benchmarks.answers --python $(SERVE)/bin/python $(BENCH)
 
 build/bench/node/.ready: benchmarks/peers/package.json

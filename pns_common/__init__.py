@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from pns_common.operator.sharpness import sharp_edges
     from pns_common.refinement import Refinement, refine, refine_many
     from pns_common.version import VERSION as __version__  # noqa: N811
-    from pns_common.warming import warm_up
 
 _HOMES = {
     "Creases": "mesh.creases",
@@ -54,7 +53,6 @@ _HOMES = {
     "refine_many": "refinement",
     "sharp_edges": "operator.sharpness",
     "subdivide": "interop.subdivide",
-    "warm_up": "warming",
 }
 
 __all__ = [
@@ -76,7 +74,6 @@ __all__ = [
     "refine_many",
     "sharp_edges",
     "subdivide",
-    "warm_up",
 ]
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import Any, Literal, SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.errors import MeshError, ParameterError
-from pns_common.kernels import ANNOUNCEMENT, are_compiled
 from pns_common.kernels import loop as kernels
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh.creases import Creases, chosen_creases
@@ -190,7 +188,6 @@ def refine(
         ModelError: the network's answer is not finite, or has another shape.
         MeshError: the refined coordinates are too large, or not numbers.
     """
-    _announce_compiling()
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
     children = len(mesh.corners) if scheme.base.polygons else 4 * mesh.face_count
@@ -310,13 +307,6 @@ def refine_many(
         )
         for mesh, creases in jobs
     ]
-
-
-@cache
-def _announce_compiling() -> None:
-    """Say once that the first refinement after an installation compiles the kernels."""
-    if not are_compiled():
-        logging.getLogger("pns_common").info(ANNOUNCEMENT)
 
 
 def _step(level: Level, scheme: Scheme, depth: int) -> Step:

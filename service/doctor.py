@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 import platform
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from importlib import metadata
 
-PACKAGES = ("numpy", "numba", "onnx", "onnxruntime")
+PACKAGES = ("numpy", "onnx", "onnxruntime")
 # A refinement keeps its bound up to rounding.
 ROUNDING = 1e-9
 
@@ -77,12 +75,9 @@ def _settings() -> str:
 
 
 def _kernels() -> str:
-    from .warming import warm_up
+    from pns_common.kernels import AHEAD
 
-    began = time.perf_counter()
-    compiled = warm_up(partial(print, file=sys.stderr, flush=True))
-    seconds = f"ready after {time.perf_counter() - began:.1f} s"
-    return f"{seconds}, {compiled} compiled" if compiled else seconds
+    return "compiled ahead of time" if AHEAD else "compiled by numba at the first call of each"
 
 
 def _providers() -> str:

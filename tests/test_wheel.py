@@ -14,7 +14,7 @@ import setuptools
 
 from pns_common.model.file import DEFAULT_MODEL
 from pns_common.version import VERSION
-from tests.support.installed import ROOT, checkout, environment, lend_kernels, run
+from tests.support.installed import ROOT, checkout, environment, run
 
 README = (ROOT / "README.md").read_text()
 ADDRESS = re.compile(r"running on (http://[\d.]+:\d+)")
@@ -43,9 +43,7 @@ def library(wheel, tmp_path_factory):
 @pytest.fixture(scope="module")
 def service(wheel, tmp_path_factory):
     """Programs of an environment with the service too."""
-    programs = environment(tmp_path_factory.mktemp("service"), wheel, {"service"})
-    lend_kernels(programs)
-    return programs
+    return environment(tmp_path_factory.mktemp("service"), wheel, {"service"})
 
 
 def commands(*programs):
@@ -64,6 +62,7 @@ def test_both_distributions_are_fit_to_publish(distributions):
 def test_the_wheel_holds_two_packages_models_page_and_licence(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     wanted = {"pns_common/py.typed", "pns_common/kernels/loop.py"}
+    wanted |= {"pns_common/kernels/compiled.abi3.so"}
     wanted |= {"pns_service/cli/commands.py", "pns_service/http/routes.py"}
     wanted |= {"pns_service/web/index.html"}
     wanted |= {f"pns_common/models/{name}.onnx" for name in ("paper", DEFAULT_MODEL)}
@@ -91,12 +90,12 @@ def test_setuptools_takes_no_folder_of_the_service_for_a_forgotten_package(monke
     assert {f"pns_{folder}" for folder in folders} <= set(said["packages"])
 
 
-def test_the_library_asks_for_five_packages(wheel, tmp_path):
+def test_the_library_asks_for_four_packages(wheel, tmp_path):
     (metadata,) = [n for n in zipfile.ZipFile(wheel).namelist() if n.endswith("METADATA")]
     text = zipfile.ZipFile(wheel).read(metadata).decode()
     asked = [line for line in text.splitlines() if line.startswith("Requires-Dist")]
     base = sorted(line.split()[1].partition(">")[0] for line in asked if "extra ==" not in line)
-    assert base == ["jaxtyping", "numba", "numpy", "onnx", "onnxruntime"]
+    assert base == ["jaxtyping", "numpy", "onnx", "onnxruntime"]
 
 
 def test_readmes_python_prints_what_readme_says(tmp_path):

@@ -1,10 +1,13 @@
 """Build the extension: the wheels it needs beside it, packed and checked by Blender's own tool.
 
 python -m addons.blender.build PYTHON                       # PYTHON has bpy (`make addon`)
-python -m addons.blender.build PYTHON windows-x64           # for another platform
+python -m addons.blender.build PYTHON windows-x64 LIBRARY   # for another platform
 
-The wheels of numba, llvmlite and onnxruntime are built for one platform and one version of Python:
-that of PYTHON, which is Blender's own.
+onnxruntime's wheel is for one platform and one version of Python: that of PYTHON, Blender's own.
+The library's wheel is for one platform, and any Python from 3.11 on. It is built here for this
+platform; for another, LIBRARY is the wheel that ``library_wheel`` built there:
+
+python -c "from addons.blender.build import *; library_wheel(Path('dist'))"
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ SOURCE = Path(__file__).with_name("pns_refine")
 CORE = Path(__file__).with_name("core.toml")
 DIST = ROOT / "dist"
 # What the library imports, and Blender does not have; pinned by constraints.txt.
-REQUIRED = ("jaxtyping", "wadler-lindig", "numba", "llvmlite", "onnxruntime")
+REQUIRED = ("jaxtyping", "wadler-lindig", "onnxruntime")
 # Blender's names of platforms, and those of wheels.
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"),
@@ -43,17 +46,19 @@ print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
 """
 
 
-def main(python: str, platform: str | None = None) -> None:
+def main(python: str, platform: str | None = None, library: str | None = None) -> None:
     """Build the zip, and let Blender validate what was packed."""
     tool = said(python, "-c", TOOL).splitlines()[-1]
     version, system = said(python, "-c", PYTHON_TAG).split()
     platform = platform or PLATFORM_OF.get(system, system)
     if platform not in PLATFORMS:
         raise SystemExit(f"{platform}: expected one of {', '.join(PLATFORMS)}")
+    if library is None and platform != PLATFORM_OF.get(system):
+        raise SystemExit(f"{platform}: name a wheel of the library that was built there")
     with tempfile.TemporaryDirectory() as folder:
         stage, packed = Path(folder) / "pns_refine", Path(folder) / "packed"
         packed.mkdir()
-        staged(stage, platform, version)
+        staged(stage, platform, version, library)
         print(said(python, tool, "build", "--source-dir", stage, "--output-dir", packed))
         (built,) = packed.glob("*.zip")
         print(said(python, tool, "validate", built))
@@ -63,11 +68,15 @@ def main(python: str, platform: str | None = None) -> None:
     print(f"{target}: {target.stat().st_size:,} bytes")
 
 
-def staged(stage: Path, platform: str, version: str) -> None:
+def staged(stage: Path, platform: str, version: str, library: str | None) -> None:
     """Stage the extension's folder as it is packed: sources, licence, wheels, and a manifest."""
     shutil.copytree(SOURCE, stage, ignore=shutil.ignore_patterns("__pycache__"))
     wheels = stage / "wheels"
     collect_wheels(wheels, platform, version)
+    if library is None:
+        library_wheel(wheels)
+    else:
+        shutil.copy(library, wheels)
     manifest = stage / "blender_manifest.toml"
     names = sorted(path.name for path in wheels.iterdir())
     manifest.write_text(with_wheels(manifest.read_text(), names, platform))
@@ -80,7 +89,7 @@ def with_wheels(manifest: str, names: Sequence[str], platform: str) -> str:
 
 
 def collect_wheels(folder: Path, platform: str, version: str) -> None:
-    """Collect the extension's wheels: the library alone, and what it needs as published.
+    """Collect the wheels that the library needs, as published.
 
     ``version`` is that of Python, such as 3.11.
     """
@@ -99,11 +108,16 @@ def collect_wheels(folder: Path, platform: str, version: str) -> None:
         ROOT / "constraints.txt",
         *REQUIRED,
     )
+
+
+def library_wheel(folder: Path) -> None:
+    """Build the wheel of the library alone, for this platform."""
     with tempfile.TemporaryDirectory() as copy:
         source = clean_copy(Path(copy) / "source")
         shutil.copy(CORE, source / "pyproject.toml")
-        (source / "setup.py").unlink()
-        said(*pip, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source)
+        shutil.rmtree(source / "service")
+        pip = (sys.executable, "-m", "pip", "--quiet", "wheel", "--wheel-dir", folder)
+        said(*pip, "--no-deps", "--no-build-isolation", source)
 
 
 def clean_copy(folder: Path) -> Path:

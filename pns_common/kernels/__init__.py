@@ -1,9 +1,13 @@
 """Compiled loops over edges, faces and vertices.
 
-Each module holds the loops of one subject. A loop is decorated with ``kernel``; the small functions
-of scalars and 3-vectors that its body is made of are decorated with ``inlined``. Compilation
-happens at the first call and is cached beside the sources, or in numba's cache folder where these
-cannot be written. No fast-math: nothing is reordered or contracted.
+Each module holds the loops of one subject. A loop is decorated with ``kernel``, and its parameters
+say their types: ``f8_2d`` is a C-contiguous array of float64 of two axes, ``int``, ``float`` and
+``bool`` are numbers; ``f4_2d | f8_2d`` stands for a loop each. The small functions of scalars and
+3-vectors that its body is made of are decorated with ``inlined`` and need no types.
+
+All loops are compiled when the package is built (ahead.py), into ``compiled``. Where that
+is missing, or older than a source here, or PNS_JIT=1 is set, numba compiles each loop at its first
+call. Both give the same bits. No fast-math: nothing is reordered or contracted.
 
 Loops over edges, faces or vertices take ``begin`` and ``end`` and write their own rows only, so
 that several threads may share the work and the result does not depend on how they do.
@@ -14,37 +18,89 @@ index counts from the end.
 
 from __future__ import annotations
 
+import hashlib
+import os
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit  # pyright: ignore[reportMissingTypeStubs]
-
-kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
-inlined: Any = njit(nogil=True, error_model="numpy", forceinline=True)
-
-ANNOUNCEMENT = "Compiling kernels, once: about half a minute"
+HERE = Path(__file__).parent
+# 1: let numba compile each loop at its first call; ahead.py says "ahead".
+JIT = os.environ.get("PNS_JIT", "")
 
 
-def are_compiled() -> bool:
-    """Return whether compiled code is kept from an earlier run."""
-    folder = Path(config.CACHE_DIR) if config.CACHE_DIR else Path(__file__).parent / "__pycache__"
-    return any(folder.rglob("children.*.nbc"))
+@dataclass(frozen=True)
+class ArrayType:
+    """A C-contiguous array: numpy's code of its dtype, and how many axes it has."""
+
+    dtype: str
+    axes: int
+
+    def __or__(self, other: ArrayType) -> tuple[ArrayType, ArrayType]:
+        return self, other
 
 
-def forget_stale_code() -> None:
-    """Delete cached code that is older than any source file of this package.
+f4_2d = ArrayType("f4", 2)
+f8_1d, f8_2d = ArrayType("f8", 1), ArrayType("f8", 2)
+i1_1d = ArrayType("i1", 1)
+i4_1d, i4_2d = ArrayType("i4", 1), ArrayType("i4", 2)
+i8_1d, i8_2d = ArrayType("i8", 1), ArrayType("i8", 2)
+u4_1d, u4_2d = ArrayType("u4", 1), ArrayType("u4", 2)
+b1_1d, b1_2d = ArrayType("b1", 1), ArrayType("b1", 2)
 
-    numba compares a cached loop with the file that the loop stands in, and not with the files of
-    the functions that the loop calls.
+
+def sources_digest() -> str:
+    """Return the SHA-256 of the sources of the loops."""
+    digest = hashlib.sha256()
+    for path in sorted(HERE.glob("*.[ch]")) + sorted(HERE.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _compiled() -> dict[str, Any]:
+    """Return the loops compiled ahead of time; none where they are missing, stale or not wanted."""
+    try:
+        from pns_common.kernels import compiled
+    except ImportError:
+        return {}
+    return {} if JIT or sources_digest() != compiled.DIGEST else vars(compiled)
+
+
+def _decorators() -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+    """Return what ``kernel`` and ``inlined`` are.
+
+    Raises:
+        ImportError: the loops are not compiled, and numba is not installed.
     """
-    here = Path(__file__).parent
-    newest = max(path.stat().st_mtime for path in here.glob("*.py"))
-    for path in (here / "__pycache__").glob("*.nb[ic]"):
-        # Other processes that start meanwhile delete it too.
-        with suppress(FileNotFoundError):
+    if AHEAD:
+        return _loop_ahead, lambda function: function
+    try:
+        from numba import njit  # pyright: ignore[reportMissingTypeStubs]
+    except ImportError:
+        raise ImportError(
+            "pns_common has no compiled loops for these sources. Install it again where there is a "
+            "C compiler, or let numba compile them: pip install 'pns-subdivision[jit]'"
+        ) from None
+    # numba compares a cached loop with its own file, not with the files of what it calls.
+    newest = max(path.stat().st_mtime for path in HERE.glob("*.py"))
+    for path in (HERE / "__pycache__").glob("*.nb[ic]"):
+        with suppress(FileNotFoundError):  # other processes that start meanwhile delete it too
             if path.stat().st_mtime < newest:
                 path.unlink()
+    building: dict[str, Any] = {"no_cpython_wrapper": JIT == "ahead", "no_cfunc_wrapper": True}
+    return (
+        njit(cache=JIT != "ahead", nogil=True, error_model="numpy", **building),
+        njit(nogil=True, error_model="numpy", forceinline=True, **building),
+    )
 
 
-forget_stale_code()
+def _loop_ahead(function: Any) -> Any:
+    return AHEAD[f"{function.__module__.rpartition('.')[2]}.{function.__name__}"]
+
+
+AHEAD = _compiled()
+kernel: Any
+inlined: Any
+kernel, inlined = _decorators()

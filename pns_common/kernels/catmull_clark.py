@@ -6,7 +6,19 @@ and reads all corners.
 
 from __future__ import annotations
 
-from pns_common.kernels import kernel
+from pns_common.kernels import (
+    b1_1d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    i8_2d,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import (
     INTERIOR,
     SKIPPED_ROWS,
@@ -27,7 +39,7 @@ LIMIT_EDGE = 4
 
 
 @kernel
-def place_faces(points, corners, offsets, begin, end, placed):
+def place_faces(points: f8_2d, corners: u4_1d, offsets: i4_1d, begin: int, end: int, placed: f8_2d):
     """Write the vertices of faces begin … end − 1: the means of their corners."""
     for f in range(max(begin, 0), end):
         first, stop = offsets[f], offsets[f + 1]
@@ -43,7 +55,16 @@ def place_faces(points, corners, offsets, begin, end, placed):
 
 @kernel
 def place_edges(
-    points, at_faces, edges, half_edges, face_of_corner, edge_class, soft, begin, end, placed
+    points: f8_2d,
+    at_faces: f8_2d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    face_of_corner: u4_1d,
+    edge_class: i1_1d,
+    soft: f8_1d,
+    begin: int,
+    end: int,
+    placed: f8_2d,
 ):
     """Write the vertices of edges begin … end − 1: the smooth rule's if interior, else the middle.
 
@@ -70,7 +91,16 @@ def place_edges(
 
 @kernel
 def sum_corners(
-    points, at_faces, corners, offsets, face_of_corner, reach, begin, end, sums, counts
+    points: f8_2d,
+    at_faces: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    reach: i8_2d,
+    begin: int,
+    end: int,
+    sums: f8_2d,
+    counts: i4_1d,
 ):
     """Sum over the corners at vertices begin … end − 1; write how many there are.
 
@@ -97,7 +127,7 @@ def sum_corners(
 
 
 @kernel
-def blend_corners(points, counts, begin, end, sums):
+def blend_corners(points: f8_2d, counts: i4_1d, begin: int, end: int, sums: f8_2d):
     """Turn sums over k corners into the smooth vertices begin … end − 1: (k − 2)/k p + sum/k²."""
     for v in range(max(begin, 0), end):
         count = counts[v]
@@ -116,7 +146,16 @@ def blend_corners(points, counts, begin, end, sums):
 
 @kernel
 def sum_limit_corners(
-    placed, corners, offsets, face_of_corner, corner_edges, reach, edge_count, begin, end, sums
+    placed: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    reach: i8_2d,
+    edge_count: int,
+    begin: int,
+    end: int,
+    sums: f8_2d,
 ):
     """Write k² p + 4 Σ e_j + Σ d_j, over its sum k (k + 5), of vertices begin … end − 1."""
     count = sums.shape[0]
@@ -146,21 +185,21 @@ def sum_limit_corners(
 
 @kernel
 def sum_darts(
-    placed,
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    edge_count,
-    first,
-    size,
-    at,
-    weights,
-    rows,
-    sums,
-    total,
+    placed: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    edge_count: int,
+    first: i4_1d,
+    size: i4_1d,
+    at: i8_1d,
+    weights: f8_1d,
+    rows: i8_1d,
+    sums: f8_2d,
+    total: f8_1d,
 ):
     """Add the weighted spokes and diagonals of darts.
 
@@ -189,23 +228,23 @@ def sum_darts(
 
 @kernel
 def sector_normals(
-    placed,
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    vertex_count,
-    edge_count,
-    first,
-    size,
-    at,
-    masks,
-    outwards,
-    begin,
-    end,
-    to,
+    placed: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    vertex_count: int,
+    edge_count: int,
+    first: i4_1d,
+    size: i4_1d,
+    at: i8_1d,
+    masks: f8_2d,
+    outwards: b1_1d,
+    begin: int,
+    end: int,
+    to: f8_2d,
 ):
     """Write the unit normals of the limit surface in sectors begin … end − 1.
 

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_2d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.vectors import (
     NO_AREA,
@@ -90,18 +101,18 @@ def mark_fold(p, q, r, u, v, w, scale, shared, cosine, to):
 
 @kernel
 def mark_folds(
-    loop,
-    displacement,
-    scale,
-    shared,
-    changed,
-    cosine,
-    faces,
-    face_edges,
-    vertex_count,
-    begin,
-    end,
-    to,
+    loop: f8_2d,
+    displacement: f8_2d,
+    scale: f8_1d,
+    shared: b1_1d,
+    changed: b1_1d,
+    cosine: float,
+    faces: u4_2d,
+    face_edges: u4_2d,
+    vertex_count: int,
+    begin: int,
+    end: int,
+    to: b1_1d,
 ):
     """Mark the corners of folded children of triangles begin … end − 1 whose s is not 0 yet.
 
@@ -123,7 +134,15 @@ def mark_folds(
 
 
 @kernel
-def child_normals(points, faces, face_edges, vertex_count, begin, end, normals):
+def child_normals(
+    points: f8_2d,
+    faces: u4_2d,
+    face_edges: u4_2d,
+    vertex_count: int,
+    begin: int,
+    end: int,
+    normals: f8_2d,
+):
     """Write the unit normals of the children 4 f … 4 f + 3 of triangles begin … end − 1."""
     for f in range(max(begin, 0), end):
         for i in range(4):
@@ -157,7 +176,7 @@ def _starting(h):
 
 
 @kernel
-def largest_chord_inside(normals, begin, end):
+def largest_chord_inside(normals: f8_2d, begin: int, end: int):
     """Return the largest squared chord between a middle child and its neighbours."""
     largest = 0.0
     for f in range(max(begin, 0), end):
@@ -167,7 +186,9 @@ def largest_chord_inside(normals, begin, end):
 
 
 @kernel
-def largest_chord_across(normals, half_edges, edge_class, begin, end):
+def largest_chord_across(
+    normals: f8_2d, half_edges: i4_2d, edge_class: i1_1d, begin: int, end: int
+):
     """Return the largest squared chord across the halves of interior edges begin … end − 1."""
     largest = 0.0
     for e in range(max(begin, 0), end):
@@ -179,7 +200,7 @@ def largest_chord_across(normals, half_edges, edge_class, begin, end):
 
 
 @kernel
-def opposed_normals(normals, others, begin, end):
+def opposed_normals(normals: f8_2d, others: f8_2d, begin: int, end: int):
     """Count the rows whose normals oppose each other."""
     count = 0
     for f in range(max(begin, 0), end):
@@ -188,7 +209,7 @@ def opposed_normals(normals, others, begin, end):
 
 
 @kernel
-def referenced_sum(points, corners, used, total):
+def referenced_sum(points: f8_2d, corners: i8_1d | u4_1d, used: b1_1d, total: f8_1d):
     """Mark the referenced vertices in ``used``; return their number, write their sum."""
     for h in range(corners.shape[0]):
         used[corners[h]] = True
@@ -202,7 +223,7 @@ def referenced_sum(points, corners, used, total):
 
 
 @kernel
-def farthest(points, used, centre):
+def farthest(points: f8_2d, used: b1_1d, centre: f8_1d):
     """Return the largest distance of a marked vertex from ``centre``."""
     largest = 0.0
     for v in range(points.shape[0]):

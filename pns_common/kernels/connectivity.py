@@ -6,7 +6,18 @@ by first appearance over faces.
 
 from __future__ import annotations
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    i8_2d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = 0, 1, 2, 3
 # In place of an edge's second half-edge: there is none; there are more than two.
@@ -34,7 +45,16 @@ HIGH, NEXT, FIRST, SECOND = 0, 1, 2, 3
 
 
 @kernel
-def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, plain):
+def number_edges(
+    corners: u4_1d,
+    offsets: i4_1d,
+    most_steps: int,
+    head: i4_1d,
+    low: u4_1d,
+    links: i4_2d,
+    corner_edges: u4_1d,
+    plain: i1_1d,
+):
     """Assign a number to each edge of a face list; return how many there are.
 
     Each vertex keeps a chain of the edges whose lower end it is. A vertex that is the lower end of
@@ -87,7 +107,7 @@ def number_edges(corners, offsets, most_steps, head, low, links, corner_edges, p
 
 
 @kernel
-def read_links(low, links, begin, end, edges, half_edges):
+def read_links(low: u4_1d, links: i4_2d, begin: int, end: int, edges: u4_2d, half_edges: i4_2d):
     """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
     for e in range(max(begin, 0), end):
         edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
@@ -111,7 +131,7 @@ def _may_have_twin(corner_edges, links, f):
 
 
 @kernel
-def mark_repeats(corners, offsets, repeats):
+def mark_repeats(corners: u4_1d, offsets: i4_1d, repeats: b1_1d):
     """Mark the faces that name a vertex twice; return whether there is one."""
     found = False
     for f in range(offsets.shape[0] - 1):
@@ -124,7 +144,15 @@ def mark_repeats(corners, offsets, repeats):
 
 
 @kernel
-def classify_edges(corners, face_of_corner, repeats, half_edges, begin, end, edge_class):
+def classify_edges(
+    corners: u4_1d,
+    face_of_corner: u4_1d,
+    repeats: b1_1d,
+    half_edges: i4_2d,
+    begin: int,
+    end: int,
+    edge_class: i1_1d,
+):
     """Write the classes of edges begin … end − 1.
 
     An interior edge has two half-edges that run against each other. An edge of a face that names a
@@ -153,7 +181,7 @@ def _in_repeating_face(face_of_corner, repeats, h):
 
 
 @kernel
-def count_ends(edges, rows, counts):
+def count_ends(edges: u4_2d, rows: i8_1d | u4_1d, counts: i4_1d):
     """Count how many of the edges ``rows`` end at each vertex; ``counts`` (V,) is 0 on entry."""
     for e in rows:
         counts[edges[e, 0]] += 1
@@ -216,7 +244,7 @@ def twin(corner_edges, half_edges, edge_class, h):
 
 
 @kernel
-def count_corners(corners, reach, begin, end, corner, count):
+def count_corners(corners: u4_1d, reach: i8_2d, begin: int, end: int, corner: i4_1d, count: i4_1d):
     """Write the last corner at each vertex begin … end − 1, and how many there are.
 
     ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
@@ -236,16 +264,16 @@ def count_corners(corners, reach, begin, end, corner, count):
 
 @kernel
 def mark_multi_fan(
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    corner,
-    count,
-    begin,
-    end,
-    multi_fan,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    corner: i4_1d,
+    count: i4_1d,
+    begin: int,
+    end: int,
+    multi_fan: b1_1d,
 ):
     """Mark the vertices begin … end − 1 whose corners form more than one fan.
 
@@ -289,7 +317,14 @@ def mark_multi_fan(
 
 
 @kernel
-def split_faces(faces, face_edges, vertex_count, begin, end, to_faces):
+def split_faces(
+    faces: u4_2d,
+    face_edges: u4_2d,
+    vertex_count: int,
+    begin: int,
+    end: int,
+    to_faces: i8_2d | u4_2d,
+):
     """Write the children 4 f … 4 f + 3 of triangles begin … end − 1."""
     for f in range(max(begin, 0), end):
         for i in range(3):
@@ -315,7 +350,15 @@ def opened_before(half_edges, corner):
 
 
 @kernel
-def number_halves(faces, face_edges, edges, half_edges, begin, end, halves):
+def number_halves(
+    faces: u4_2d,
+    face_edges: u4_2d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    begin: int,
+    end: int,
+    halves: u4_2d,
+):
     """Assign numbers to both children of the edges that first appear in faces begin … end − 1.
 
     ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
@@ -357,18 +400,18 @@ def _write_half(e, vertex, child, faces, vertex_count, half_edges, edge_class, t
 
 @kernel
 def split_edges(
-    faces,
-    face_edges,
-    half_edges,
-    edge_class,
-    halves,
-    vertex_count,
-    begin,
-    end,
-    to_face_edges,
-    to_edges,
-    to_half_edges,
-    to_class,
+    faces: u4_2d,
+    face_edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    halves: u4_2d,
+    vertex_count: int,
+    begin: int,
+    end: int,
+    to_face_edges: u4_2d,
+    to_edges: u4_2d,
+    to_half_edges: i4_2d,
+    to_class: i1_1d,
 ):
     """Write the edges of the children of triangles begin … end − 1."""
     to = to_edges, to_half_edges, to_class
@@ -401,7 +444,7 @@ def split_edges(
 
 
 @kernel
-def pair_up(first, second, free, chosen):
+def pair_up(first: i8_1d, second: i8_1d, free: b1_1d, chosen: b1_1d):
     """Choose pairs in their order, each of two things that are free; they are free no longer."""
     for n in range(len(first)):
         if free[first[n]] and free[second[n]]:

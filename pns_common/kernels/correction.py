@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import f8_1d, f8_2d, i8_1d, inlined, kernel, u4_1d
 from pns_common.kernels.vectors import dot, norm, over, row
 
 # Products above this have all their digits.
@@ -58,7 +58,18 @@ def _write(at, delta, gate, bound, displacement, ratio, gates, bounds):
 
 @kernel
 def correct_by_equation_1(
-    rows, first, begin, end, eta, frames, gate, bound, displacement, ratio, gates, bounds
+    rows: u4_1d,
+    first: int,
+    begin: int,
+    end: int,
+    eta: f8_2d,
+    frames: f8_2d,
+    gate: f8_1d,
+    bound: f8_1d,
+    displacement: f8_2d,
+    ratio: f8_1d,
+    gates: f8_1d,
+    bounds: f8_1d,
 ):
     """Write δ = h² γ F η (C / R), ‖η‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 
@@ -75,20 +86,20 @@ def correct_by_equation_1(
 
 @kernel
 def correct_by_prior(
-    rows,
-    first,
-    begin,
-    end,
-    z,
-    basis,
-    reach,
-    gate,
-    bound,
-    weight,
-    displacement,
-    ratio,
-    gates,
-    bounds,
+    rows: i8_1d | u4_1d,
+    first: int,
+    begin: int,
+    end: int,
+    z: f8_2d,
+    basis: f8_2d,
+    reach: f8_1d,
+    gate: f8_1d,
+    bound: f8_1d,
+    weight: f8_1d,
+    displacement: f8_2d,
+    ratio: f8_1d,
+    gates: f8_1d,
+    bounds: f8_1d,
 ):
     """Write δ = w γ Π_ρ(D + τ ℓ F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 
@@ -115,7 +126,18 @@ def correct_by_prior(
 
 @kernel
 def correct_from_flat(
-    rows, first, begin, end, asked, reach, gate, bound, displacement, ratio, gates, bounds
+    rows: u4_1d,
+    first: int,
+    begin: int,
+    end: int,
+    asked: f8_2d,
+    reach: f8_1d,
+    gate: f8_1d,
+    bound: f8_1d,
+    displacement: f8_2d,
+    ratio: f8_1d,
+    gates: f8_1d,
+    bounds: f8_1d,
 ):
     """Write δ = γ Π_ρ(D + τ h u), ‖u‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
 
@@ -138,7 +160,15 @@ def correct_from_flat(
 
 
 @kernel
-def add_on_curves(rows, share, prior, bound, displacement, ratio, bounds):
+def add_on_curves(
+    rows: i8_1d,
+    share: f8_1d,
+    prior: f8_2d,
+    bound: f8_1d,
+    displacement: f8_2d,
+    ratio: f8_1d,
+    bounds: f8_1d,
+):
     """Add share Π_ρ(D) to δ at new vertices of curves: ``rows`` of the output, with ρ = ``bound``.
 
     Args:

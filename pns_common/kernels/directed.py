@@ -11,7 +11,20 @@ import math
 
 import numpy as np
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f4_2d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, previous_corner
 from pns_common.kernels.frames import wing
 from pns_common.kernels.measures import LENGTH
@@ -103,21 +116,21 @@ def _opposite(points, h, corners, offsets, face_of_corner):
 
 @kernel
 def directed_features(
-    points,
-    normals,
-    fields,
-    means,
-    logs,
-    sizes,
-    corners,
-    offsets,
-    face_of_corner,
-    edges,
-    half_edges,
-    edge_class,
-    begin,
-    end,
-    features,
+    points: f8_2d,
+    normals: f8_2d,
+    fields: f8_2d,
+    means: f8_2d,
+    logs: f8_1d,
+    sizes: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    begin: int,
+    end: int,
+    features: f4_2d,
 ):
     """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
 
@@ -185,7 +198,14 @@ def _length_ratio(h, log, sizes, v):
 
 
 @kernel
-def measure_sizes(means, valence, on_border, begin, end, sizes):
+def measure_sizes(
+    means: f8_2d,
+    valence: i4_1d,
+    on_border: b1_1d,
+    begin: int,
+    end: int,
+    sizes: f8_2d,
+):
     """Write logarithms of mean length and of valence / 6, and 1 at borders, of some vertices.
 
     The first is NO_LOG where there is no length.
@@ -198,7 +218,14 @@ def measure_sizes(means, valence, on_border, begin, end, sizes):
 
 
 @kernel
-def pool(states, starts, spokes, begin, end, pooled):
+def pool(
+    states: f4_2d,
+    starts: i8_1d,
+    spokes: u4_1d,
+    begin: int,
+    end: int,
+    pooled: f4_2d,
+):
     """Write mean and largest state of the directed edges that leave vertices begin … end − 1.
 
     Args:
@@ -222,7 +249,14 @@ def pool(states, starts, spokes, begin, end, pooled):
 
 
 @kernel
-def gather(states, pooled, edges, begin, end, messages):
+def gather(
+    states: f4_2d,
+    pooled: f4_2d,
+    edges: u4_2d,
+    begin: int,
+    end: int,
+    messages: f4_2d,
+):
     """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
 
     A row of ``messages``, (2 (end − begin), 6 W), is the edge's own state, that of the reverse
@@ -244,20 +278,20 @@ def gather(states, pooled, edges, begin, end, messages):
 
 @kernel
 def read_heads(
-    points,
-    normals,
-    fields,
-    corners,
-    face_of_corner,
-    edges,
-    half_edges,
-    edge_class,
-    heads,
-    begin,
-    end,
-    asked,
-    leaving,
-    logits,
+    points: f8_2d,
+    normals: f8_2d,
+    fields: f8_2d,
+    corners: u4_1d,
+    face_of_corner: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    heads: f8_2d,
+    begin: int,
+    end: int,
+    asked: f8_2d,
+    leaving: f8_2d,
+    logits: f8_1d,
 ):
     """Write what edges begin … end − 1 answer, out of their frames.
 
@@ -289,7 +323,16 @@ def read_heads(
 
 
 @kernel
-def mean_leaving(leaving, corner_logits, starts, spokes, begin, end, asked, logits):
+def mean_leaving(
+    leaving: f8_2d,
+    corner_logits: f8_1d,
+    starts: i8_1d,
+    spokes: u4_1d,
+    begin: int,
+    end: int,
+    asked: f8_2d,
+    logits: f8_1d,
+):
     """Write means over the directed edges that leave vertices begin … end − 1.
 
     Args:
@@ -311,7 +354,16 @@ def mean_leaving(leaving, corner_logits, starts, spokes, begin, end, asked, logi
 
 
 @kernel
-def mean_in_faces(heights, corners, offsets, corner_edges, edges, begin, end, asked):
+def mean_in_faces(
+    heights: f8_1d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    edges: u4_2d,
+    begin: int,
+    end: int,
+    asked: f8_1d,
+):
     """Write the mean of ``heights`` (2 E,) over the directed edges around faces begin … end − 1."""
     edge_count = edges.shape[0]
     for f in range(max(begin, 0), end):
@@ -323,7 +375,11 @@ def mean_in_faces(heights, corners, offsets, corner_edges, edges, begin, end, as
 
 
 @kernel
-def find_leaving(edges, stops, spokes):
+def find_leaving(
+    edges: u4_2d,
+    stops: i8_1d,
+    spokes: u4_1d,
+):
     """Write the directed edges that leave vertex 0, 1, …, one after another.
 
     Args:

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f4_2d,
+    f8_1d,
+    f8_2d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import next_corner, previous_corner
 from pns_common.kernels.measures import CLEAR_NORMAL, HEIGHT
 from pns_common.kernels.vectors import (
@@ -57,28 +69,28 @@ def _extent(h, p, q, c, d):
 
 @kernel
 def frames_and_features(
-    points,
-    normals,
-    fields,
-    lengths,
-    logs,
-    opened,
-    corners,
-    edges,
-    corner_edges,
-    half_edges,
-    rows,
-    begin,
-    end,
-    symmetric,
-    starts,
-    frames,
-    curvature,
-    sides,
-    length,
-    extent,
-    degenerate,
-    features,
+    points: f8_2d,
+    normals: f8_2d,
+    fields: f8_2d,
+    lengths: f8_1d,
+    logs: f8_1d,
+    opened: f8_1d,
+    corners: u4_1d,
+    edges: u4_2d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    rows: u4_1d,
+    begin: int,
+    end: int,
+    symmetric: bool,
+    starts: i8_1d,
+    frames: f8_2d,
+    curvature: f8_1d,
+    sides: f8_1d,
+    length: f8_1d,
+    extent: f8_1d,
+    degenerate: b1_1d,
+    features: f4_2d | f8_2d,
 ):
     """Write frames and features of the interior edges rows[begin:end]; row 0 is the first of them.
 
@@ -198,28 +210,28 @@ def _log(p, q):
 
 @kernel
 def polygon_frames_and_features(
-    points,
-    normals,
-    fields,
-    lengths,
-    logs,
-    opened,
-    corners,
-    offsets,
-    face_of_corner,
-    edges,
-    half_edges,
-    rows,
-    begin,
-    end,
-    starts,
-    frames,
-    curvature,
-    sides,
-    length,
-    extent,
-    degenerate,
-    features,
+    points: f8_2d,
+    normals: f8_2d,
+    fields: f8_2d,
+    lengths: f8_1d,
+    logs: f8_1d,
+    opened: f8_1d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    rows: u4_1d,
+    begin: int,
+    end: int,
+    starts: i8_1d,
+    frames: f8_2d,
+    curvature: f8_1d,
+    sides: f8_1d,
+    length: f8_1d,
+    extent: f8_1d,
+    degenerate: b1_1d,
+    features: f4_2d | f8_2d,
 ):
     """Write what ``frames_and_features`` does with ``symmetric``, of edges between polygons.
 
@@ -263,18 +275,18 @@ NORMAL, SQUARE, EXTENT, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 13
 
 @kernel
 def measure_face_vertices(
-    points,
-    fields,
-    corners,
-    offsets,
-    corner_edges,
-    lengths,
-    jumps,
-    bends,
-    rows,
-    begin,
-    end,
-    measures,
+    points: f8_2d,
+    fields: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    lengths: f8_1d,
+    jumps: f8_1d,
+    bends: f8_1d,
+    rows: i8_1d,
+    begin: int,
+    end: int,
+    measures: f8_2d,
 ):
     """Write what the rule of face vertices reads, of faces rows[begin:end]; row 0 is the first.
 

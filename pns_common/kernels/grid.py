@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import kernel
+from pns_common.kernels import f4_2d, f8_1d, f8_2d, i4_1d, i4_2d, i8_1d, i8_2d, kernel, u4_2d
 
 # A point's owner: corners 0 … 2, edges 3 … 5, the face itself.
 EDGES, FACE = 3, 6
 
 
 @kernel
-def take_columns(rows, columns, begin, end, taken):
+def take_columns(rows: i4_2d | i8_2d, columns: i8_1d, begin: int, end: int, taken: i4_2d):
     """Write some columns of rows begin … end − 1."""
     for r in range(begin, end):
         for k in range(columns.shape[0]):
@@ -17,7 +17,17 @@ def take_columns(rows, columns, begin, end, taken):
 
 
 @kernel
-def number_points(corners, on_edges, inside, count, owner, place, begin, end, ids):
+def number_points(
+    corners: i8_2d,
+    on_edges: i8_2d,
+    inside: int,
+    count: int,
+    owner: i8_1d,
+    place: i8_2d,
+    begin: int,
+    end: int,
+    ids: i4_2d,
+):
     """Write the vertices at the points of faces begin … end − 1.
 
     Args:
@@ -42,7 +52,9 @@ def number_points(corners, on_edges, inside, count, owner, place, begin, end, id
 
 
 @kernel
-def move_to_vertices(ids, at_points, begin, end, labels):
+def move_to_vertices(
+    ids: i4_2d | i8_2d, at_points: i4_2d | i8_2d, begin: int, end: int, labels: i4_1d | i8_1d
+):
     """Write the labels of the points of faces begin … end − 1 to their vertices."""
     for f in range(begin, end):
         for t in range(ids.shape[1]):
@@ -50,7 +62,9 @@ def move_to_vertices(ids, at_points, begin, end, labels):
 
 
 @kernel
-def blend_along(values, edges, parameters, begin, end, blended):
+def blend_along(
+    values: f8_2d, edges: i8_2d | u4_2d, parameters: f8_1d, begin: int, end: int, blended: f8_2d
+):
     """Blend values at the points of edges begin … end − 1, from their first corner to their second.
 
     Args:
@@ -66,7 +80,7 @@ def blend_along(values, edges, parameters, begin, end, blended):
 
 
 @kernel
-def blend_inside(values, faces, weights, begin, end, blended):
+def blend_inside(values: f8_2d, faces: i8_2d, weights: f8_2d, begin: int, end: int, blended: f8_2d):
     """Blend values at the points inside faces begin … end − 1.
 
     Args:
@@ -84,7 +98,7 @@ def blend_inside(values, faces, weights, begin, end, blended):
 
 
 @kernel
-def round_rows(values, rows, begin, end, rounded):
+def round_rows(values: f8_2d, rows: i4_1d | i8_1d, begin: int, end: int, rounded: f4_2d):
     """Write rows begin … end − 1 of ``rows``, in single precision."""
     for r in range(begin, end):
         for k in range(values.shape[1]):

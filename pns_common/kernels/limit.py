@@ -7,7 +7,18 @@ q_j and q_{j+1}. In a closed sector q_k = q_0.
 
 from __future__ import annotations
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+)
 from pns_common.kernels.connectivity import INTERIOR, following_corner, preceding_corner
 from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over, row
 
@@ -29,7 +40,14 @@ def opposed(corner_edges, half_edges, edge_class, h):
 
 @kernel
 def label_sectors(
-    offsets, face_of_corner, corner_edges, half_edges, edge_class, of_corner, first, size
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    of_corner: i4_1d,
+    first: i4_1d,
+    size: i4_1d,
 ):
     """Find the sectors, open ones first; return how many are open, and how many there are.
 
@@ -60,21 +78,21 @@ def label_sectors(
 
 @kernel
 def sector_normals(
-    points,
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    first,
-    size,
-    at,
-    masks,
-    outwards,
-    begin,
-    end,
-    to,
+    points: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    first: i4_1d,
+    size: i4_1d,
+    at: i8_1d,
+    masks: f8_2d,
+    outwards: b1_1d,
+    begin: int,
+    end: int,
+    to: f8_2d,
 ):
     """Write the unit normals of the limit surface in sectors begin … end − 1.
 
@@ -122,7 +140,7 @@ def add(sums, weight, v):
 
 
 @kernel
-def mean_of_sectors(normals, vertices, to, lengths):
+def mean_of_sectors(normals: f8_2d, vertices: u4_1d, to: f8_2d, lengths: f8_1d):
     """Write the unit mean of the normals of each vertex's sectors; 0 where they cancel.
 
     ``to`` (V, 3) and ``lengths`` (V,) are 0 on entry.
@@ -141,20 +159,20 @@ def mean_of_sectors(normals, vertices, to, lengths):
 
 @kernel
 def sum_darts(
-    points,
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    first,
-    size,
-    at,
-    weights,
-    rows,
-    sums,
-    total,
+    points: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    first: i4_1d,
+    size: i4_1d,
+    at: i8_1d,
+    weights: f8_1d,
+    rows: i8_1d,
+    sums: f8_2d,
+    total: f8_1d,
 ):
     """Add the weighted spokes of darts.
 

@@ -6,7 +6,19 @@ reads all edges.
 
 from __future__ import annotations
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    i8_2d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import INTERIOR, skipped_block
 
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
@@ -23,7 +35,17 @@ def opposite(faces, half_edge):
 
 
 @kernel
-def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, placed):
+def place_edges(
+    points: f8_2d,
+    faces: u4_2d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    soft: f8_1d,
+    begin: int,
+    end: int,
+    placed: f8_2d,
+):
     """Write the vertices of edges begin … end − 1: Loop's if interior, else the midpoint.
 
     An edge of sharpness w gets (1 − w) Loop's + w the midpoint. ``soft`` is (0,) where no interior
@@ -46,7 +68,9 @@ def place_edges(points, faces, edges, half_edges, edge_class, soft, begin, end, 
 
 
 @kernel
-def sum_rings(points, edges, reach, begin, end, sums, valence):
+def sum_rings(
+    points: f8_2d, edges: u4_2d, reach: i8_2d, begin: int, end: int, sums: f8_2d, valence: i4_1d
+):
     """Write the sums of neighbours, and the valences, of vertices begin … end − 1."""
     for v in range(max(begin, 0), end):
         valence[v] = 0
@@ -67,7 +91,7 @@ def sum_rings(points, edges, reach, begin, end, sums, valence):
 
 
 @kernel
-def blend_rings(points, valence, beta, begin, end, sums):
+def blend_rings(points: f8_2d, valence: i4_1d, beta: f8_1d, begin: int, end: int, sums: f8_2d):
     """Turn sums of neighbours into Loop's smooth vertices begin … end − 1 (equation 3).
 
     ``beta``: Loop's weight of one neighbour, for each valence that occurs.
@@ -80,7 +104,7 @@ def blend_rings(points, valence, beta, begin, end, sums):
 
 
 @kernel
-def sharpest_edges(edges, rows, sharpness, weights, neighbours):
+def sharpest_edges(edges: u4_2d, rows: u4_1d, sharpness: f8_1d, weights: f8_2d, neighbours: u4_2d):
     """Find the three sharpest edges at each vertex, in descending order of sharpness.
 
     Args:
@@ -114,7 +138,15 @@ def at_sharpness(smooth, curve, stays, second, third):
 
 
 @kernel
-def blend_sharp(points, rows, weights, neighbours, centre, side, placed):
+def blend_sharp(
+    points: f8_2d,
+    rows: i8_1d,
+    weights: f8_2d,
+    neighbours: u4_2d,
+    centre: float,
+    side: float,
+    placed: f8_2d,
+):
     """Move the vertices ``rows``, on two or more edges of sharpness above 0.
 
     The rule of a curve is ``centre`` p + ``side`` (the two neighbours along it). On three sharp
@@ -133,7 +165,7 @@ def blend_sharp(points, rows, weights, neighbours, centre, side, placed):
 
 
 @kernel
-def largest_coordinate(points, begin, end):
+def largest_coordinate(points: f8_2d, begin: int, end: int):
     """Return the largest absolute coordinate of rows begin … end − 1; NaN where one is."""
     largest = 0.0
     for v in range(max(begin, 0), end):

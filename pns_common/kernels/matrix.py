@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import kernel
+from pns_common.kernels import f8_1d, i4_1d, i8_1d, kernel, u4_1d
 
 
 @kernel
-def colour_stars(corners, offsets, faces, starts, taken, colour):
+def colour_stars(
+    corners: u4_1d, offsets: i4_1d, faces: i8_1d | u4_1d, starts: i8_1d, taken: i8_1d, colour: i8_1d
+):
     """Colour vertices so that those on the faces around any one vertex differ; return how many.
 
     Args:
@@ -38,16 +40,16 @@ def colour_stars(corners, offsets, faces, starts, taken, colour):
 
 @kernel
 def multiply_rows(
-    later_starts,
-    later_columns,
-    later_weights,
-    starts,
-    columns,
-    weights,
-    total,
-    to_starts,
-    to_columns,
-    to_weights,
+    later_starts: i8_1d,
+    later_columns: i8_1d,
+    later_weights: f8_1d,
+    starts: i8_1d,
+    columns: i8_1d,
+    weights: f8_1d,
+    total: f8_1d,
+    to_starts: i8_1d,
+    to_columns: i8_1d,
+    to_weights: f8_1d,
 ):
     """Multiply two sparse matrices; return how many entries the product has.
 

@@ -8,7 +8,21 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f4_2d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    i8_2d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, face_of, skipped_block
 from pns_common.kernels.vectors import (
     NO_AREA,
@@ -36,7 +50,7 @@ SHORTEST_SQUARE = 1e-300
 
 
 @kernel
-def measure_faces(points, faces, begin, end, normals, areas):
+def measure_faces(points: f8_2d, faces: u4_2d, begin: int, end: int, normals: f8_2d, areas: f8_2d):
     """Write unit normals, and twice the area vectors with their lengths, of triangles.
 
     ``areas`` is (F, 4), or (0, 4) where it is not wanted.
@@ -53,7 +67,15 @@ def measure_faces(points, faces, begin, end, normals, areas):
 
 
 @kernel
-def measure_polygons(points, corners, offsets, begin, end, normals, areas):
+def measure_polygons(
+    points: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    begin: int,
+    end: int,
+    normals: f8_2d,
+    areas: f8_2d,
+):
     """Write what ``measure_faces`` does, of polygons: their area vectors are sums over fans."""
     for f in range(max(begin, 0), end):
         first, stop = offsets[f], offsets[f + 1]
@@ -79,18 +101,18 @@ def measure_polygons(points, corners, offsets, begin, end, normals, areas):
 
 @kernel
 def measure_edges(
-    points,
-    normals,
-    corners,
-    face_of_corner,
-    edges,
-    half_edges,
-    edge_class,
-    begin,
-    end,
-    lengths,
-    jumps,
-    bends,
+    points: f8_2d,
+    normals: f8_2d,
+    corners: u4_1d,
+    face_of_corner: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    begin: int,
+    end: int,
+    lengths: f8_1d,
+    jumps: f8_1d,
+    bends: f8_1d,
 ):
     """Write h, x = 1 − n1 · n2 and the signed sine of edges begin … end − 1.
 
@@ -117,7 +139,15 @@ def measure_edges(
 
 
 @kernel
-def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, cosines):
+def turn_cosines(
+    normals: f8_2d,
+    face_of_corner: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    begin: int,
+    end: int,
+    cosines: f8_1d,
+):
     """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
     for e in range(max(begin, 0), end):
         cosines[e] = 1.0
@@ -129,7 +159,15 @@ def turn_cosines(normals, face_of_corner, half_edges, edge_class, begin, end, co
 
 
 @kernel
-def mean_normals(corners, face_of_corner, reach, areas, begin, end, fields):
+def mean_normals(
+    corners: u4_1d,
+    face_of_corner: u4_1d,
+    reach: i8_2d,
+    areas: f8_2d,
+    begin: int,
+    end: int,
+    fields: f8_2d,
+):
     """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4).
 
     ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
@@ -167,7 +205,19 @@ def _add_spoke(means, v, spoke, square, jump, bend, length):
 
 
 @kernel
-def mean_spokes(points, edges, reach, jumps, bends, sharp, begin, end, means, valence, fields):
+def mean_spokes(
+    points: f8_2d,
+    edges: u4_2d,
+    reach: i8_2d,
+    jumps: f8_1d,
+    bends: f8_1d,
+    sharp: i4_1d,
+    begin: int,
+    end: int,
+    means: f8_2d,
+    valence: i4_1d,
+    fields: f8_2d,
+):
     """Write means over the spokes of vertices begin … end − 1, and their umbrella heights.
 
     The umbrella height is u · m / h_v; 0 where a sharp edge ends. ``sharp`` counts the sharp edges
@@ -203,7 +253,16 @@ def mean_spokes(points, edges, reach, jumps, bends, sharp, begin, end, means, va
 
 
 @kernel
-def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
+def mean_neighbours(
+    points: f8_2d,
+    edges: u4_2d,
+    reach: i8_2d,
+    fields: f8_2d,
+    valence: i4_1d,
+    begin: int,
+    end: int,
+    means: f8_2d,
+):
     """Write means over the neighbours of vertices begin … end − 1: opening, height, mean x."""
     for block in range(reach.shape[0]):
         first, count = skipped_block(edges, reach, block, begin, end)
@@ -227,7 +286,9 @@ def mean_neighbours(points, edges, reach, fields, valence, begin, end, means):
 
 
 @kernel
-def vertex_features(means, fields, rows, begin, end, features):
+def vertex_features(
+    means: f8_2d, fields: f8_2d, rows: i8_1d, begin: int, end: int, features: f4_2d | f8_2d
+):
     """Write the features ``ring-10`` of vertices rows[begin:end]; row 0 is the first of them."""
     for i in range(max(begin, 0), end):
         v = rows[i]
@@ -250,7 +311,7 @@ def _quotient(value, by):
 
 
 @kernel
-def ring_basis(means, fields, rows, begin, end, basis):
+def ring_basis(means: f8_2d, fields: f8_2d, rows: i8_1d, begin: int, end: int, basis: f8_2d):
     """Write mean normal, umbrella and pull in units of h_v, of vertices rows[begin:end]: (N, 9)."""
     for i in range(max(begin, 0), end):
         v = rows[i]
@@ -262,7 +323,17 @@ def ring_basis(means, fields, rows, begin, end, basis):
 
 
 @kernel
-def normal_pushes(pull, fields, valence, ringed, weight, strength, begin, end, pushes):
+def normal_pushes(
+    pull: f8_2d,
+    fields: f8_2d,
+    valence: i4_1d,
+    ringed: b1_1d,
+    weight: f8_1d,
+    strength: float,
+    begin: int,
+    end: int,
+    pushes: f8_2d,
+):
     """Write d_v = −s w_k (u · m̂) m̂ of vertices begin … end − 1: the prior of the operator.
 
     Args:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import b1_2d, f4_2d, f8_2d, i1_1d, i4_2d, i8_1d, i8_2d, inlined, kernel
 from pns_common.kernels.connectivity import INTERIOR, next_corner
 from pns_common.kernels.vectors import across, between, cross, divisor, dot, norm, over, row
 
@@ -53,7 +53,14 @@ def angle_between(sine, cosine):
 
 
 @kernel
-def mark_opposed(points, normals, faces, begin, end, opposed):
+def mark_opposed(
+    points: f4_2d | f8_2d,
+    normals: f4_2d,
+    faces: i4_2d | i8_2d,
+    begin: int,
+    end: int,
+    opposed: b1_2d,
+):
     """Mark the corners of faces begin … end − 1 whose normal is more than 90 degrees off."""
     for f in range(begin, end):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -64,7 +71,15 @@ def mark_opposed(points, normals, faces, begin, end, opposed):
 
 
 @kernel
-def measure_triangles(points, faces, triangles, begin, end, normals, angles):
+def measure_triangles(
+    points: f8_2d,
+    faces: i4_2d | i8_2d,
+    triangles: i8_2d,
+    begin: int,
+    end: int,
+    normals: f8_2d,
+    angles: f8_2d,
+):
     """Write unit normals and angles of the triangles of faces begin … end − 1.
 
     Normals are 0 without area, and where a triangle is turned over against its face as a whole: a
@@ -102,7 +117,9 @@ def measure_triangles(points, faces, triangles, begin, end, normals, angles):
 
 
 @kernel
-def add_corners(normals, angles, groups, triangles, total):
+def add_corners(
+    normals: f8_2d, angles: f8_2d, groups: i4_2d | i8_2d, triangles: i8_2d, total: f8_2d
+):
     """Add normals of triangles, times their angles, to the groups of their corners, in order."""
     count = triangles.shape[0]
     for f in range(groups.shape[0]):
@@ -116,7 +133,7 @@ def add_corners(normals, angles, groups, triangles, total):
 
 
 @kernel
-def scale_to_unit(begin, end, total):
+def scale_to_unit(begin: int, end: int, total: f8_2d):
     """Scale rows begin … end − 1 to length 1; to zeros where they have no direction."""
     for g in range(begin, end):
         vector = row(total, g)
@@ -126,7 +143,7 @@ def scale_to_unit(begin, end, total):
 
 
 @kernel
-def perpendicular_tangents(tangents, normals, begin, end, made):
+def perpendicular_tangents(tangents: f8_2d, normals: f8_2d, begin: int, end: int, made: f8_2d):
     """Write the unit projections of tangents begin … end − 1 onto the planes of unit normals."""
     for r in range(begin, end):
         tangent, normal = row(tangents, r), row(normals, r)
@@ -163,7 +180,7 @@ def _join(fans, g, h):
 
 
 @kernel
-def join_corners(half_edges, edge_class, fans):
+def join_corners(half_edges: i4_2d, edge_class: i1_1d, fans: i8_1d):
     """Write the fan of each corner (3 F,), numbered by first appearance; return how many.
 
     Across each interior edge the corners of both faces are joined, at either end.

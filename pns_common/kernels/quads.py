@@ -14,7 +14,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    b1_1d,
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_2d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.children import mark_fold, moved, squared_chord
 from pns_common.kernels.connectivity import INTERIOR, following_corner, opened_before
 from pns_common.kernels.vectors import NO_AREA, cross, difference, dot, norm, over, row
@@ -23,7 +35,16 @@ QUAD = 4
 
 
 @kernel
-def split_faces(corners, offsets, corner_edges, vertex_count, face_vertex, begin, end, to):
+def split_faces(
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    vertex_count: int,
+    face_vertex: int,
+    begin: int,
+    end: int,
+    to: i8_2d | u4_2d,
+):
     """Write the quads of the corners of faces begin … end − 1; ``face_vertex`` is face 0's."""
     for f in range(max(begin, 0), end):
         first, stop = offsets[f], offsets[f + 1]
@@ -34,7 +55,16 @@ def split_faces(corners, offsets, corner_edges, vertex_count, face_vertex, begin
 
 
 @kernel
-def number_halves(corners, offsets, corner_edges, edges, half_edges, begin, end, halves):
+def number_halves(
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    begin: int,
+    end: int,
+    halves: u4_2d,
+):
     """Assign numbers to both halves of the edges that first appear in faces begin … end − 1.
 
     ``halves`` (E, 2), out: the half at the lower endpoint, and at the higher.
@@ -84,21 +114,21 @@ def _write_half(e, vertex, child, parent, vertex_count, half_edges, edge_class, 
 
 @kernel
 def split_edges(
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    half_edges,
-    edge_class,
-    edges,
-    halves,
-    vertex_count,
-    begin,
-    end,
-    to_corner_edges,
-    to_edges,
-    to_half_edges,
-    to_class,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    edges: u4_2d,
+    halves: u4_2d,
+    vertex_count: int,
+    begin: int,
+    end: int,
+    to_corner_edges: u4_2d,
+    to_edges: u4_2d,
+    to_half_edges: i4_2d,
+    to_class: i1_1d,
 ):
     """Write the edges of the quads of faces begin … end − 1."""
     parent, to = (corners, offsets, face_of_corner), (to_edges, to_half_edges, to_class)
@@ -154,20 +184,20 @@ def quad_normal(p, q, r, s):
 
 @kernel
 def mark_folds(
-    base,
-    displacement,
-    scale,
-    shared,
-    changed,
-    cosine,
-    corners,
-    offsets,
-    corner_edges,
-    vertex_count,
-    face_vertex,
-    begin,
-    end,
-    to,
+    base: f8_2d,
+    displacement: f8_2d,
+    scale: f8_1d,
+    shared: b1_1d,
+    changed: b1_1d,
+    cosine: float,
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    vertex_count: int,
+    face_vertex: int,
+    begin: int,
+    end: int,
+    to: b1_1d,
 ):
     """Mark corners of the quads of faces begin … end − 1 that fold at one of their four corners.
 
@@ -192,7 +222,15 @@ def mark_folds(
 
 @kernel
 def child_normals(
-    points, corners, offsets, corner_edges, vertex_count, face_vertex, begin, end, normals
+    points: f8_2d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    vertex_count: int,
+    face_vertex: int,
+    begin: int,
+    end: int,
+    normals: f8_2d,
 ):
     """Write the unit normals of the quads of faces begin … end − 1."""
     for f in range(max(begin, 0), end):
@@ -210,7 +248,7 @@ def child_normals(
 
 
 @kernel
-def largest_chord_inside(normals, offsets, begin, end):
+def largest_chord_inside(normals: f8_2d, offsets: i4_1d, begin: int, end: int):
     """Return the largest squared chord between neighbouring quads of faces begin … end − 1."""
     largest = 0.0
     for f in range(max(begin, 0), end):
@@ -222,7 +260,15 @@ def largest_chord_inside(normals, offsets, begin, end):
 
 
 @kernel
-def largest_chord_across(normals, offsets, face_of_corner, half_edges, edge_class, begin, end):
+def largest_chord_across(
+    normals: f8_2d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    begin: int,
+    end: int,
+):
     """Return the largest squared chord across the halves of interior edges begin … end − 1."""
     largest = 0.0
     for e in range(max(begin, 0), end):

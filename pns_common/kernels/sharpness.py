@@ -10,7 +10,18 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import (
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_1d,
+    i4_2d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.connectivity import INTERIOR, following_corner, preceding_corner
 from pns_common.kernels.frames import wing
 from pns_common.kernels.vectors import between, difference, dot, norm, root, row
@@ -65,14 +76,14 @@ def _log(value, by):
 
 
 @kernel
-def signed_turns(jumps, bends, begin, end, turns):
+def signed_turns(jumps: f8_1d, bends: f8_1d, begin: int, end: int, turns: f8_1d):
     """Write the turns t of edges begin … end − 1."""
     for e in range(max(begin, 0), end):
         turns[e] = math.copysign(root(jumps[e] / 2), bends[e])
 
 
 @kernel
-def find_spokes(edges, stops, spokes):
+def find_spokes(edges: u4_2d, stops: i8_1d, spokes: u4_1d):
     """Write the edges at vertex 0, 1, …, one after another.
 
     Args:
@@ -95,7 +106,9 @@ def _keep_largest(columns, v, first, count, value):
 
 
 @kernel
-def measure_turns(turns, lengths, starts, spokes, begin, end, columns):
+def measure_turns(
+    turns: f8_1d, lengths: f8_1d, starts: i8_1d, spokes: u4_1d, begin: int, end: int, columns: f8_2d
+):
     """Write ``columns`` (V, COLUMNS) of vertices begin … end − 1."""
     for v in range(max(begin, 0), end):
         for k in range(COLUMNS):
@@ -201,24 +214,24 @@ def _ascend(to, i, j):
 
 @kernel
 def edge_features(
-    points,
-    lengths,
-    jumps,
-    turns,
-    areas,
-    columns,
-    starts,
-    spokes,
-    corners,
-    offsets,
-    face_of_corner,
-    corner_edges,
-    edges,
-    half_edges,
-    edge_class,
-    mean_length,
-    rows,
-    features,
+    points: f8_2d,
+    lengths: f8_1d,
+    jumps: f8_1d,
+    turns: f8_1d,
+    areas: f8_1d,
+    columns: f8_2d,
+    starts: i8_1d,
+    spokes: u4_1d,
+    corners: u4_1d,
+    offsets: i4_1d,
+    face_of_corner: u4_1d,
+    corner_edges: u4_1d,
+    edges: u4_2d,
+    half_edges: i4_2d,
+    edge_class: i1_1d,
+    mean_length: float,
+    rows: u4_1d,
+    features: f8_2d,
 ):
     """Write the columns up to LOCAL of interior edges ``rows``.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import inlined, kernel
+from pns_common.kernels import f8_1d, f8_2d, i4_1d, i4_2d, inlined, kernel
 
 # Rows of as many numbers and more are added up in eight partial sums, as numpy does.
 PARTIAL = 8
@@ -37,7 +37,9 @@ def _sum_of_row(weights, r):
 
 
 @kernel
-def keep_heaviest(columns, names, begin, end, kept_names, kept, lost):
+def keep_heaviest(
+    columns: f8_2d, names: i4_1d, begin: int, end: int, kept_names: i4_2d, kept: f8_2d, lost: f8_1d
+):
     """Put columns of rows begin … end − 1 into their slots (N, K), heaviest first.
 
     Args:
@@ -65,7 +67,7 @@ def keep_heaviest(columns, names, begin, end, kept_names, kept, lost):
 
 
 @kernel
-def scale_rows(weights, begin, end):
+def scale_rows(weights: f8_2d, begin: int, end: int):
     """Scale rows begin … end − 1 so that each sums to 1; those without weight stay 0."""
     for r in range(begin, end):
         total = _sum_of_row(weights, r)
@@ -74,7 +76,7 @@ def scale_rows(weights, begin, end):
 
 
 @kernel
-def whole_units(weights, total_units, begin, end, below, units):
+def whole_units(weights: f8_2d, total_units: int, begin: int, end: int, below: f8_1d, units: i4_2d):
     """Round rows begin … end − 1 to integers that sum to ``total_units``, or to 0 without weight.
 
     Args:

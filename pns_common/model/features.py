@@ -25,7 +25,7 @@ from math import inf, pi
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Float, Int64, Integer
 
 
 @dataclass(frozen=True)
@@ -109,13 +109,13 @@ class FeatureSet:
         return len(self.features)
 
     @cached_property
-    def starts(self) -> tuple[int, ...]:
+    def starts(self) -> Int64[np.ndarray, " G"]:
         """The first column of each of `EDGE_GROUPS`; −1 for those that the set has not."""
         starts, column = [-1] * len(EDGE_GROUPS), 0
         for group in self.groups:
             starts[EDGE_GROUPS.index(group)] = column
             column += len(group.features)
-        return tuple(starts)
+        return np.array(starts, dtype=np.int64)
 
     @property
     def rings(self) -> bool:

@@ -292,7 +292,8 @@ def surroundings(
     if len(faces):
         around = lengths[mesh.corner_edges] ** 2
         of_faces = np.add.reduceat(around, mesh.offsets[:-1]) / in_faces
-    rows = np.flatnonzero(level.ringed), mesh.interior, faces
+    ringed = np.flatnonzero(level.ringed).astype(np.uint32)
+    rows = ringed, mesh.interior, faces.astype(np.uint32)
     at_rest = np.ones(len(flat), dtype=bool)
     for first, moved in zip((0, len(points), len(points) + edge_count), rows, strict=True):
         at_rest[first + moved] = False

@@ -21,7 +21,6 @@ from pns_common.errors import PnsError
 from pns_common.files import replace_file
 from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme
-from pns_common.progress import compiling
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, SiblingFiles, folder_of
@@ -120,7 +119,7 @@ def _convert_one(
         data, siblings = sys.stdin.buffer.read(), ALONE
     else:
         data, siblings = job.source.read_bytes(), folder_of(job.source)
-    with _progress(console) as course, compiling(console.print) as compiled:
+    with _progress(console) as course:
         written = converted(
             data,
             job.kind,
@@ -146,7 +145,7 @@ def _convert_one(
         replace_file(jobs.report, text + b"\n")
     for line in (*lines_of(written.report), *map(as_flags, written.report["advice"])):
         console.print(printable(line), markup=False)
-    seconds = time.perf_counter() - began - compiled.seconds
+    seconds = time.perf_counter() - began
     name = "stdout" if job.output == STREAM else job.output
     made, triangles = f"{written.faces:,} faces", written.triangles
     made += f", {triangles:,} triangles," if triangles != written.faces else ""

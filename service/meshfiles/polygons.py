@@ -299,7 +299,6 @@ def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
     else:
         places, triangles = _covering(mesh), ONE_TRIANGLE
         rows = mesh.corners[places], number[places]
-        rows[0].flags.writeable = False  # as those of quads, for which the kernel is compiled
     normals = angle_weighted_normals(mesh.vertices, *rows, count, blocks, triangles)
     return Layer(safe_unit(normals), np.where(groups >= 0, number, NONE))
 

@@ -173,17 +173,9 @@ _MODELS = Models()
 
 def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
     """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from pns_common import ModelError
-
     from ..meshfiles import convert  # noqa: F401
-    from ..warming import warm_up as compile_kernels
 
-    _MODELS.hold(model, providers)
-    try:
-        compile_kernels(log.info)
-    except ModelError as error:
-        raise NoModelError(str(error)) from error
-    _MODELS.get()
+    hold_model(model, providers)
 
 
 def hold_model(model: Model | str | None, providers: Sequence[str] | None = None) -> None:

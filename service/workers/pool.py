@@ -24,8 +24,7 @@ T = TypeVar("T")
 
 # Where a fresh process cannot even warm up, the next one is not started at once.
 RESTART_SECONDS = 5.0
-# A warm-up imports and loads, and where kernels are not kept compiles them: minutes on a busy
-# machine. What was compiled is lost with a worker that is killed, and the next begins anew.
+# A warm-up imports and loads; with the extra `jit` it compiles, for minutes on a busy machine.
 WARM_UP_SECONDS = 600.0
 # How long a worker may take to end a job by itself, when it is asked to, before it is killed. A
 # fresh one takes as long to warm up: to kill it earlier would only let those who leave end workers

@@ -85,9 +85,3 @@ def test_the_image_says_what_it_is_made_of():
 def test_the_images_settings_are_settings():
     names = set(re.findall(r"PNS_([A-Z_]+)", DOCKERFILE))
     assert {name.lower() for name in names} <= set(Settings.model_fields)
-
-
-def test_the_kernels_of_the_installed_package_are_compiled():
-    """In /src, `python -m` would take the sources there, and every worker would compile again."""
-    assert "cd / && export NUMBA_CACHE_DIR=/opt/pns/kernels" in DOCKERFILE
-    assert "/opt/pns/bin/python -m pns_common.warming" in DOCKERFILE

@@ -112,7 +112,7 @@ def test_other_numbers_of_the_ends_are_a_half_turn(name):
     points, faces = bumpy_sphere()
     count = len(points)
     seen = edges_of(points, faces, name)
-    other = edges_of(points[::-1], count - 1 - faces, name)
+    other = edges_of(points[::-1].copy(), count - 1 - faces, name)
     group = FEATURE_SETS[name].symmetries
     for (a, b), (phi, basis) in seen.items():
         again, frame = other[count - 1 - b, count - 1 - a]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from importlib.metadata import distribution
@@ -11,8 +10,6 @@ from typing import Any
 
 from packaging.metadata import Metadata
 from packaging.requirements import Requirement
-
-from pns_common import kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -47,18 +44,6 @@ def environment(folder: Path, wheel: Path, extras: set[str]) -> Path:
     for name in closure(parsed.requires_dist or [], extras, own=parsed.name):
         _link(name, site)
     return folder / "bin"
-
-
-def lend_kernels(programs: Path) -> None:
-    """Give an environment the kernels that this checkout has compiled, if it has."""
-    ours = Path(kernels.__file__).parent
-    (theirs,) = programs.parent.glob("lib/python*/site-packages/pns_common/kernels")
-    # Compiled code is kept for a source file of one size and time.
-    for source in ours.glob("*.py"):
-        shutil.copy2(source, theirs / source.name)
-    (theirs / "__pycache__").mkdir(exist_ok=True)
-    for code in (ours / "__pycache__").glob("*.nb[ic]"):
-        shutil.copy2(code, theirs / "__pycache__" / code.name)
 
 
 def closure(requirements: list[Requirement], extras: set[str], own: str) -> set[str]:

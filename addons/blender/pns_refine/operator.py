@@ -8,7 +8,6 @@ from bpy.props import BoolProperty
 from mathutils import Vector
 
 from pns_common import PnsError
-from pns_common.kernels import are_compiled
 
 from . import live
 from .animation import redirect_drivers
@@ -47,7 +46,7 @@ def made_count(objects: list[bpy.types.Object], settings: Settings) -> int:
 
 def fits_at_once(faces: int) -> bool:
     """Return whether so many faces are made without a wait that one would notice."""
-    return faces <= AT_ONCE and are_compiled()
+    return faces <= AT_ONCE
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import bpy
-
-from pns_common import warm_up
-from pns_common.kernels import are_compiled
 
 from .losses import irregularities, losses
 from .reading import Reading, read_mesh
@@ -125,8 +122,6 @@ def refine_mesh(
 
     ``into`` is written anew, if given, in place of a new mesh; ``reading`` is the mesh's, if known.
     """
-    if not are_compiled():
-        yield from compile_kernels(share)
     mesh: bpy.types.Mesh = obj.data
     if reading is None:
         reading = yield from read_mesh(mesh)
@@ -142,24 +137,6 @@ def refine_mesh(
     notes = losses(obj, reading, refined) + irregularities(refined) + refused
     remember(new, refined, notes)
     return Made(mesh, new, refined)
-
-
-def compile_kernels(share: Share) -> Generator[object, None, None]:
-    """Compile the library's kernels in a thread of their own, once after the installation."""
-
-    def work(report: Callable[[float], None]) -> None:
-        warm_up(lambda text: None, lambda done, total: report(done / total))
-
-    before, share.text = share.text, "Compiling, once after the installation"
-    job = Job(work).start()
-    try:
-        while job.running:
-            share.value = job.share
-            yield WAITING
-        job.answer()
-    finally:
-        job.cancel()
-    share.text = before
 
 
 __all__ = ["Key", "Made", "Run", "Share", "StoppedError", "key_of", "refine_mesh", "refine_meshes"]

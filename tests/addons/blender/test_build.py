@@ -36,8 +36,8 @@ def test_what_is_bundled_is_what_the_library_needs():
     needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     # Blender has numpy; bundled models are read without onnx.
     names = {line.split(">")[0] for line in needed} - {"numpy", "onnx"}
-    # wadler-lindig is jaxtyping's own, llvmlite is numba's.
-    assert set(REQUIRED) == names | {"wadler-lindig", "llvmlite"}
+    # wadler-lindig is jaxtyping's own.
+    assert set(REQUIRED) == names | {"wadler-lindig"}
 
 
 def test_the_library_alone_is_described_as_the_whole_describes_it():

@@ -32,7 +32,7 @@ export async function serve(settings = {}) {
         await new Promise((resolve) => setTimeout(resolve, 100));
       }
     },
-    /** The first refinement on a machine compiles: not what a test should wait for. */
+    /** A worker's first refinement loads the networks: not what a picture or a figure should wait for. */
     async warm() {
       await this.ready();
       for (const scheme of ["pns", "loop"]) {

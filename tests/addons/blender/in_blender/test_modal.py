@@ -4,7 +4,6 @@ import threading
 from types import SimpleNamespace
 
 import bl_ext.user_default.pns_refine.operator as operator
-import bl_ext.user_default.pns_refine.run as run_module
 import bpy
 import pytest
 from bl_ext.user_default.pns_refine.run import StoppedError
@@ -87,17 +86,6 @@ def test_ticks_lead_to_the_result_of_the_operator():
     assert context.timers == 0
     assert context.status[-1] is None
     assert any("Escape stops" in text for text in context.status[:-1])
-
-
-def test_kernels_are_compiled_beside_the_interface_which_says_so(monkeypatch):
-    for module in operator, run_module:
-        monkeypatch.setattr(module, "are_compiled", lambda: False)
-    grid(3)
-    context, run = Context(), Large(scheme="LOOP", levels=1)
-    assert not operator.fits_at_once(2 * 3 * 3)
-    run.invoke(context, event("LEFTMOUSE"))
-    assert driven(run, context) == {"FINISHED"}
-    assert any("Compiling" in text for text in context.status[:-1])
 
 
 def test_escape_leaves_everything_as_it_was():
