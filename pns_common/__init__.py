@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pns_common.errors import MeshError, ModelError, ParameterError, PnsError
     from pns_common.interop.subdivide import subdivide
     from pns_common.mesh.creases import Creases
+    from pns_common.mesh.cutting import cut_concave
     from pns_common.mesh.mesh import Mesh, clean
     from pns_common.model.file import load_model
     from pns_common.operator.scheme import Scheme, catmull_clark, loop, pns
@@ -46,6 +47,7 @@ _HOMES = {
     "Scheme": "operator.scheme",
     "catmull_clark": "operator.scheme",
     "clean": "mesh.mesh",
+    "cut_concave": "mesh.cutting",
     "load_model": "model.file",
     "loop": "operator.scheme",
     "pns": "operator.scheme",
@@ -67,6 +69,7 @@ __all__ = [
     "__version__",
     "catmull_clark",
     "clean",
+    "cut_concave",
     "load_model",
     "loop",
     "pns",

@@ -315,8 +315,11 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
     if scheme.acts_at(depth) and level.reference_length and scheme.rule is not None:
         # An absurd budget overflows, which is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):
-            act = directed_level if isinstance(scheme.rule, DirectedRule) else learned_level
-            added = act(level, scheme.rule)
+            added = (
+                directed_level(level, scheme.rule)
+                if isinstance(scheme.rule, DirectedRule)
+                else learned_level(level, scheme.rule)
+            )
         points = added.points
     else:
         points = level.base.place(level.points, level.topology, level.blocks)

@@ -2,10 +2,11 @@
 
 A curve becomes a cubic B-spline; its limit at a vertex p between a and b is p + (a + b − 2 p) / 6.
 The push is that taken back, across the curve, times γ = tanh(c_v x) f(x): x = 1 − the cosine of the
-turning angle, and f falls from 1 at 60 degrees to 0 at 90, since sharper corners are meant. A
+turning angle, and f falls from 1 at 45 degrees to 0 at 75, since sharper corners are meant. A
 vertex belongs to the curve along its two sharpest edges by w₂ − w₃.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +18,7 @@ from train.connectivity import Connectivity
 from train.loop_masks import CURVE_CENTRE, CURVE_SIDE
 from train.tensors import dot, unit
 
-BEND, CORNER = 1 / 2, 1.0
+BEND, CORNER = (1 - math.cos(math.radians(angle)) for angle in (45, 75))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,11 @@ def curve_push(
 ) -> Float[Tensor, "V 3"]:
     """Return d of vertices on curves, from the ways to both neighbours; `gate_sharpness` is c_v."""
     turning, along, middle = 1 + dot(unit(a), unit(b)), unit(b - a), (a + b) / 2
-    fade = ((CORNER - turning) / (CORNER - BEND)).clamp(0, 1)
-    gate = torch.tanh(gate_sharpness * turning) * fade
+    gate = torch.tanh(gate_sharpness * turning) * (1 - corner_share(turning))
     across = middle - dot(middle, along)[:, None] * along
     return -(gate / 3)[:, None] * across
+
+
+def corner_share(turning: Float[Tensor, " N"]) -> Float[Tensor, " N"]:
+    """Return how far a vertex of a curve is a corner, from 1 − the cosine of its turning angle."""
+    return ((turning - BEND) / (CORNER - BEND)).clamp(0, 1)

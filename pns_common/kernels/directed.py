@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pns_common.kernels import (
     b1_1d,
     f4_2d,
@@ -130,7 +128,7 @@ def directed_features(
     edge_class: i1_1d,
     begin: int,
     end: int,
-    features: f4_2d,
+    features: f4_2d | f8_2d,
 ):
     """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
 
@@ -219,22 +217,23 @@ def measure_sizes(
 
 @kernel
 def pool(
-    states: f4_2d,
+    states: f4_2d | f8_2d,
     starts: i8_1d,
     spokes: u4_1d,
     begin: int,
     end: int,
-    pooled: f4_2d,
+    total: f8_1d,
+    pooled: f4_2d | f8_2d,
 ):
     """Write mean and largest state of the directed edges that leave vertices begin … end − 1.
 
     Args:
         states: (2 E, W).
         starts, spokes: where the directed edges that leave each vertex begin, and these.
+        total: (W,) for sums.
         pooled: (V, 2 W) out; 0 at vertices without edges.
     """
     width = states.shape[1]
-    total = np.empty(width)
     for v in range(max(begin, 0), end):
         first, stop = starts[v], starts[v + 1]
         for k in range(width):
@@ -250,12 +249,12 @@ def pool(
 
 @kernel
 def gather(
-    states: f4_2d,
-    pooled: f4_2d,
+    states: f4_2d | f8_2d,
+    pooled: f4_2d | f8_2d,
     edges: u4_2d,
     begin: int,
     end: int,
-    messages: f4_2d,
+    messages: f4_2d | f8_2d,
 ):
     """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
 

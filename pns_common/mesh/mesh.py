@@ -140,7 +140,10 @@ class Mesh:
         _meshio().write_points_cells(path, self.vertices, cells)
 
     def triangulated(self) -> Mesh:
-        """Cut each face into triangles that meet in its first corner: right for convex faces."""
+        """Cut each face into triangles that meet in its first corner.
+
+        That is right for convex faces; ``cut_concave`` makes them.
+        """
         if self.triangles:
             return self
         return Mesh(self.vertices, self.corners[fans(self.offsets)[0]])

@@ -74,7 +74,7 @@ class Symmetries:
 
     order: Integer[np.ndarray, "G K"]
     signs: Float[np.ndarray, "G K"]
-    local: Float[np.ndarray, "G 3"]
+    local: Float[np.ndarray, "G A"]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float
 
 from pns_common.errors import ModelError
 from pns_common.kernels import directed as kernels
@@ -36,6 +37,7 @@ class DirectedNetworks:
         heads: states → answers, (N, 8): z, y, two logits; (N, 9) with a height for faces.
         width: W.
         answers: 8 or 9.
+        feature_type: the floating type of all rows between them.
     """
 
     encoder: Network
@@ -43,6 +45,7 @@ class DirectedNetworks:
     heads: Network
     width: int
     answers: int = kernels.FACE
+    feature_type: type[np.floating[Any]] = np.float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +65,15 @@ class Answers:
     corners: Float[np.ndarray, " V"]
 
 
-def directed_features(level: Level, begin: int, end: int) -> Float32[np.ndarray, "D 28"]:
+def directed_features(
+    level: Level, begin: int, end: int, feature_type: type[np.floating[Any]] = np.float32
+) -> Float[np.ndarray, "D 28"]:
     """Return the features of edges begin … end − 1: first all a → b, then all b → a.
 
     ``level`` must have no marks: ``level.unmarked``.
     """
     mesh, rings = level.topology, level.rings
-    made = np.empty((2 * (end - begin), kernels.FEATURES), dtype=np.float32)
+    made = np.empty((2 * (end - begin), kernels.FEATURES), dtype=feature_type)
     kernels.directed_features(
         level.points,
         level.normals,
@@ -125,7 +130,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     Raises:
         ModelError: an answer is not finite, or has another shape.
     """
-    mesh, width = level.topology, networks.width
+    mesh, width, kind = level.topology, networks.width, networks.feature_type
     edges, count = mesh.edges, len(mesh.edges)
     level.measure(rings=True)
     _ = _sizes(level)
@@ -133,19 +138,19 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     starts = np.concatenate([[0], np.cumsum(mesh.valence)]).astype(np.int64)
     leaving = np.empty(2 * count, dtype=np.uint32)
     kernels.find_leaving(edges, starts[:-1].copy(), leaving)
-    states = np.empty((2 * count, width), dtype=np.float32)
-    pooled = np.empty((mesh.vertex_count, 2 * width), dtype=np.float32)
+    states = np.empty((2 * count, width), dtype=kind)
+    pooled = np.empty((mesh.vertex_count, 2 * width), dtype=kind)
 
     def both(begin: int, end: int) -> tuple[slice, slice]:
         return slice(begin, end), slice(count + begin, count + end)
 
     def encode(begin: int, end: int) -> None:
-        rows = checked(networks.encoder, directed_features(level, begin, end), width)
+        rows = checked(networks.encoder, directed_features(level, begin, end, kind), width)
         there, back = both(begin, end)
         states[there], states[back] = rows[: end - begin], rows[end - begin :]
 
     def hear(update: Network, begin: int, end: int) -> None:
-        messages = np.empty((2 * (end - begin), 6 * width), dtype=np.float32)
+        messages = np.empty((2 * (end - begin), 6 * width), dtype=kind)
         kernels.gather(states, pooled, edges, begin, end, messages)
         more, (there, back) = checked(update, messages, width), both(begin, end)
         # Both ways of an edge stand in one block: nobody else reads these rows any more.
@@ -171,7 +176,9 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     for update in networks.rounds:
         level.blocks.quiet().run(
             mesh.vertex_count,
-            lambda begin, end: kernels.pool(states, starts, leaving, begin, end, pooled),
+            lambda begin, end: kernels.pool(
+                states, starts, leaving, begin, end, np.empty(width), pooled
+            ),
         )
         blocks.run(count, partial(hear, update))
     blocks.run(count, answer)

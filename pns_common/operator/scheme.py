@@ -204,7 +204,12 @@ def _directed_scheme(
         BASES[card.base],
         DirectedRule(
             DirectedNetworks(
-                encoder, tuple(rounds), heads, int(_given(model, "width")), heads_of(card)
+                encoder,
+                tuple(rounds),
+                heads,
+                int(_given(model, "width")),
+                heads_of(card),
+                getattr(model, "feature_type", np.float64),
             ),
             card.gate_sharpness,
             _given(model, "vertex_gate_sharpness"),

@@ -108,6 +108,8 @@ def _in_charts(
     count = int(max(vertex.max(), named.max())) + 1
     ends, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (vertex[sides], named))
     kept = np.isin(ends, wanted)
+    if creases.soft_corners is not None:
+        creases = replace(creases, soft_corners=creases.soft_corners[vertex])
     if creases.sharpness is None:
         return replace(creases, named=sides[kept])
     # Of a pair that is named twice the sharper one counts.

@@ -37,7 +37,7 @@ from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .parts import with_group_normals
 from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
-from .triangulate import triangulated
+from .triangulate import in_star_shaped_pieces, triangulated
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -281,7 +281,7 @@ def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshF
     if not options.learns or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
         if scheme is not None:
-            return mesh, scheme
+            return in_star_shaped_pieces(mesh), scheme
     return triangulated(mesh), make_scheme(options, model)
 
 

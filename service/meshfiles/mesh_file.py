@@ -89,13 +89,13 @@ class MeshFile:
 
     def of_faces(self, keep: Bool[np.ndarray, " F"]) -> MeshFile:
         """Return a copy of some of its faces."""
-        return self._taken(offsets_of(self.sizes[keep]), np.repeat(keep, self.sizes), keep)
+        return self.taken(offsets_of(self.sizes[keep]), np.repeat(keep, self.sizes), keep)
 
     def cut(self, places: Int[np.ndarray, "T 3"], face: Int[np.ndarray, " T"]) -> MeshFile:
         """Return the triangles of its faces, by the places of their corners and by their face."""
-        return self._taken(np.arange(0, places.size + 1, 3), places.reshape(-1), face)
+        return self.taken(np.arange(0, places.size + 1, 3), places.reshape(-1), face)
 
-    def _taken(
+    def taken(
         self, offsets: Int[np.ndarray, " G1"], corner: np.ndarray, face: np.ndarray
     ) -> MeshFile:
         """Return some corners as faces that begin at `offsets` and are parts of some faces."""

@@ -63,6 +63,7 @@ def test_budget_out_of_range_is_refused(budget):
         ("scheme", lambda: pns_common.subdivide(grid(3), scheme=MODEL)),
         ("model", lambda: pns("general")),
         ("mesh", lambda: pns_common.clean(grid(3))),
+        ("mesh", lambda: pns_common.cut_concave(grid(3))),
         ("mesh", lambda: pns_common.sharp_edges(grid(3))),
         ("source", lambda: pns_common.load_model(3)),
         ("progress", lambda: refine(Mesh(*grid(3)), loop(), progress="bar")),

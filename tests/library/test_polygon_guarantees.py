@@ -20,10 +20,13 @@ from tests.support.networks import DEFAULT_CARD, TiedPolygonModel, polygon_model
 from tests.support.polygons import (
     CUBE_FACES,
     SHAPES,
+    correspondence,
+    envelope,
     polygon_manifolds,
     polygon_soups,
     quad_grid,
     quad_star,
+    rows_of,
     uneven,
 )
 
@@ -35,23 +38,6 @@ CARD = polygon_model().card
 
 TIED = TiedPolygonModel(3)
 refined_once = partial(refine, levels=1, creases=None)
-
-
-def rows_of(mesh):
-    return [face.tolist() for face in mesh.polygons]
-
-
-def envelope(mesh, budget, length):
-    """ρ = C h² / R of each new vertex, from the mesh alone."""
-    points, topology = mesh.vertices, mesh.topology()
-    square = np.sum((points[topology.edges[:, 1]] - points[topology.edges[:, 0]]) ** 2, axis=1)
-    total, count = np.zeros(len(points)), np.zeros(len(points))
-    for end in (0, 1):
-        np.add.at(total, topology.edges[:, end], square)
-        np.add.at(count, topology.edges[:, end], 1)
-    of_faces = np.add.reduceat(square[topology.corner_edges], topology.offsets[:-1])
-    means = total / np.maximum(count, 1), square, of_faces / np.diff(topology.offsets)
-    return budget / length * np.concatenate(means)
 
 
 @given(st.one_of(polygon_manifolds(), polygon_soups(), manifolds()), models, st.floats(1e-2, 1e2))
@@ -106,18 +92,6 @@ def test_scaling_a_mesh_scales_the_result(mesh, power):
     small = refine(mesh, scheme, 2).mesh.vertices
     large = refine(Mesh(scale * mesh.vertices, rows_of(mesh)), scheme, 2).mesh.vertices
     np.testing.assert_allclose(large / scale, small, rtol=0, atol=1e-12)
-
-
-def correspondence(mesh, other, order):
-    """Find where each new vertex of a mesh is in another with vertex ``order[v]`` for v."""
-    ours, theirs = mesh.topology(), other.topology()
-    places = {frozenset(ends): e for e, ends in enumerate(theirs.edges.tolist())}
-    edges = [places[frozenset(order[list(ends)].tolist())] for ends in ours.edges.tolist()]
-    faces = {frozenset(face): f for f, face in enumerate(rows_of(other))}
-    within = [faces[frozenset(order[face].tolist())] for face in rows_of(mesh)]
-    count, edge_count = len(mesh.vertices), len(ours.edges)
-    parts = order, count + np.array(edges), count + edge_count + np.array(within)
-    return np.concatenate(parts)
 
 
 @given(polygon_manifolds(), st.integers(0, 2**31))

@@ -80,6 +80,35 @@ SHAPES = {
 }
 
 
+def rows_of(mesh):
+    return [face.tolist() for face in mesh.polygons]
+
+
+def envelope(mesh, budget, length):
+    """ρ = C h² / R of each new vertex, from the mesh alone."""
+    points, topology = mesh.vertices, mesh.topology()
+    square = np.sum((points[topology.edges[:, 1]] - points[topology.edges[:, 0]]) ** 2, axis=1)
+    total, count = np.zeros(len(points)), np.zeros(len(points))
+    for end in (0, 1):
+        np.add.at(total, topology.edges[:, end], square)
+        np.add.at(count, topology.edges[:, end], 1)
+    of_faces = np.add.reduceat(square[topology.corner_edges], topology.offsets[:-1])
+    means = total / np.maximum(count, 1), square, of_faces / np.diff(topology.offsets)
+    return budget / length * np.concatenate(means)
+
+
+def correspondence(mesh, other, order):
+    """Find where each new vertex of a mesh is in another with vertex ``order[v]`` for v."""
+    ours, theirs = mesh.topology(), other.topology()
+    places = {frozenset(ends): e for e, ends in enumerate(theirs.edges.tolist())}
+    edges = [places[frozenset(order[list(ends)].tolist())] for ends in ours.edges.tolist()]
+    faces = {frozenset(face): f for f, face in enumerate(rows_of(other))}
+    within = [faces[frozenset(order[face].tolist())] for face in rows_of(mesh)]
+    count, edge_count = len(mesh.vertices), len(ours.edges)
+    parts = order, count + np.array(edges), count + edge_count + np.array(within)
+    return np.concatenate(parts)
+
+
 @st.composite
 def polygon_soups(draw, repeats=True):
     """Any polygons over any points: irregular edges, repeated corners, coincident points."""

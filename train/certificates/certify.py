@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from pns_common import ModelError, ParameterError, PnsError
+from pns_common.model.card import DIRECTED_FORMAT
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from train.certificates.affine import affine_reproduction
 from train.certificates.bases import LOOP
@@ -21,7 +22,9 @@ from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
     fold_free,
     limit_distance,
+    locality,
     neighbour_turns,
+    numbering,
     resolution_independence,
     smoothness_class,
 )
@@ -203,7 +206,8 @@ def _steps_of_kind(
     """
     if subject.learned_once is None:
         return [Step("stars", "lifted stars", lambda: lifted_stars(subject, valences))]
-    rough = (*every, bodies.rough)
+    rough, shaped = (*every, bodies.rough), bodies.shaped
+    messages = subject.learned_once.format == DIRECTED_FORMAT
     return [
         Step("folds", "fold-free", lambda: fold_free(subject, rough, seed), own=True),
         Step(
@@ -217,6 +221,8 @@ def _steps_of_kind(
             lambda: resolution_independence(subject, every),
             own=True,
         ),
+        Step("numbers", "numbering", lambda: numbering(subject, every, seed), own=True),
+        *([Step("rings", "locality", lambda: locality(subject, shaped, seed))] * messages),
     ]
 
 

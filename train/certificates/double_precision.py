@@ -71,6 +71,11 @@ class DoubleModel:
         """Return the sharpness of edges, float64."""
         return self._answer("sharpness", "sharpness_features", features, 1.0)
 
+    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N A"]:
+        """Return the answers of the network that reads the input ``given``, float64."""
+        (output,) = (each.answer for each in networks(self.card) if each.given == given)
+        return self._answer(output, given, rows, 1.0)
+
     def _answer(
         self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
     ) -> Float[np.ndarray, "N A"]:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from pns_common import Mesh
+from pns_common.model.card import DIRECTED_FORMAT
 from train.certificates.bodies import Body, random_motion
 from train.certificates.step import step
 from train.certificates.subject import Certificate, Subject, worst
@@ -25,15 +26,18 @@ WELL_SHAPED = 1e-2
 def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Certificate]:
     """Certify T2 with the network in double precision, and again as the scheme runs.
 
-    Schemes that correct once keep mirrors too, and faces turned over. Slivers and nearly folded
-    edges are left out: rounding is amplified beyond any tolerance there, and a fallback frame does
-    not turn with the mesh.
+    Schemes that correct once keep mirrors too, and with models of format 4 faces turned over; one
+    of directed edges tells convex from concave. Slivers and nearly folded edges are left out:
+    rounding is amplified beyond any tolerance there, and a fallback frame does not turn with the
+    mesh.
     """
     rows = [_certify(subject, subject.exact, bodies, seed, "double precision")]
     if subject.is_single_precision:
         rows.append(_certify(subject, subject.scheme, bodies, seed, "as it runs", single=SINGLE))
-    if subject.learned_once is not None:
-        for how, mirror in (("mirrors", -1), ("turning over", 1)):
+    card = subject.learned_once
+    if card is not None:
+        hows = {"mirrors": -1} | ({} if card.format == DIRECTED_FORMAT else {"turning over": 1})
+        for how, mirror in hows.items():
             rows.append(_certify(subject, subject.exact, bodies, seed, how, mirror, -1))
     return rows
 

@@ -1,11 +1,12 @@
 """Certificates of schemes that correct at the control mesh and are the base scheme afterwards.
 
-Fold-free, limit distance, smoothness class and resolution independence, of the scale-free rule and
-any weights: docs/explanation/guarantees.md proves them.
+Fold-free, limit distance, smoothness class, resolution independence, numbering and locality, of the
+scale-free rule and any weights: docs/explanation/guarantees.md proves them.
 """
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -24,6 +25,8 @@ from train.refining import refine
 
 # Child faces that the base makes flatter than this, in squared edge lengths, have no direction.
 FLAT = 1e-9
+# A budget that folds no face, on meshes whose reference length is about 1.
+TOO_LITTLE = 1e-3
 # In degrees: what positions rounded to doubles may turn a face by.
 ROUNDING_ANGLE = 1e-5
 
@@ -202,3 +205,87 @@ def resolution_independence(subject: Subject, bodies: Sequence[Body]) -> Certifi
 def _displacement(subject: Subject, mesh: Mesh) -> Float[np.ndarray, "N 3"]:
     assert subject.unbounded is not None
     return step(subject.unbounded, mesh).positions - step(subject.base.scheme, mesh).positions
+
+
+def numbering(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
+    """Certify that other numbers of vertices, faces and first corners only number the result anew.
+
+    The value is the largest difference in the mesh's largest coordinates, in double precision.
+    """
+    rng, measured = np.random.default_rng(seed), []
+    for body in bodies:
+        mesh = body.mesh
+        order, turned = rng.permutation(len(mesh.vertices)), rng.permutation(mesh.face_count)
+        points = np.empty_like(mesh.vertices)
+        points[order] = mesh.vertices
+        faces = [np.roll(order[face], rng.integers(len(face))) for face in mesh.polygons]
+        other = Mesh(points, [faces[f] for f in turned])
+        ours, theirs = (step(subject.exact, each, "auto").positions for each in (mesh, other))
+        apart = np.abs(theirs[_places(mesh, other, order, turned)[: len(ours)]] - ours)
+        measured.append((float(apart.max() / np.abs(mesh.vertices).max()), body.name))
+    value, place = worst(measured)
+    return Certificate("numbers", "numbering", value, high=SAME, where=place)
+
+
+def _places(
+    mesh: Mesh, other: Mesh, order: Int[np.ndarray, " V"], turned: Int[np.ndarray, " F"]
+) -> Int[np.ndarray, " W"]:
+    """Return where each new vertex of a mesh is in one with other numbers."""
+    ours, theirs = mesh.topology().edges, other.topology().edges
+    number = {frozenset(ends): e for e, ends in enumerate(theirs.tolist())}
+    edges = [number[frozenset(ends)] for ends in order[ours.astype(np.int64)].tolist()]
+    count = len(mesh.vertices)
+    return np.concatenate([order, count + np.array(edges), count + len(edges) + np.argsort(turned)])
+
+
+def locality(subject: Subject, bodies: Sequence[Body], seed: int = 0) -> Certificate:
+    """Certify how far a vertex is seen: by two rings more than there are rounds of messages.
+
+    States see one ring more; gates read the sharpness of the edges beside. The value is the largest
+    distance, in rings of faces, from a moved vertex to the vertex, edge or face whose new vertex
+    its move changed. The budget is small: the guard's halvings may pass from face to face.
+    """
+    rng, card, measured = np.random.default_rng(seed), subject.learned_once, []
+    assert card is not None
+    assert card.rounds is not None
+    scheme = _without_guard(subject)
+    for body in bodies:
+        mesh, moved = body.mesh, body.mesh.vertices.copy()
+        chosen = int(rng.integers(len(moved)))
+        nearest = np.linalg.norm(np.delete(moved, chosen, axis=0) - moved[chosen], axis=1).min()
+        moved[chosen] += 0.2 * nearest * rng.standard_normal(3)
+        before, after = (
+            step(scheme, each, "auto").positions for each in (mesh, Mesh(moved, mesh.polygons))
+        )
+        changed = (before != after).any(axis=1)
+        rings = _rings_from(mesh, chosen)
+        edges = rings[mesh.topology().edges.astype(np.int64)].min(axis=1)
+        faces = np.minimum.reduceat(rings[mesh.corners], mesh.offsets[:-1])
+        seen = np.concatenate([rings, edges, faces])[: len(before)]
+        measured.append((float(seen[changed].max(initial=0)), f"{body.name}, vertex {chosen}"))
+    value, place = worst(measured)
+    return Certificate("rings", "locality", value, high=card.rounds + 2, where=place)
+
+
+def _without_guard(subject: Subject) -> Scheme:
+    """Return the scheme as it runs, with a budget too small to turn a face by its fold angle."""
+    scheme = subject.scheme
+    assert isinstance(scheme, Scheme)
+    assert scheme.rule is not None
+    return replace(scheme, rule=replace(scheme.rule, budget=TOO_LITTLE))
+
+
+def _rings_from(mesh: Mesh, vertex: int) -> Int[np.ndarray, " V"]:
+    """Return how many faces are on the way from a vertex to each; V where none leads there."""
+    count, face = len(mesh.vertices), np.repeat(np.arange(mesh.face_count), np.diff(mesh.offsets))
+    joins = sparse.csr_array((np.ones(len(face)), (mesh.corners, face)))
+    rings = np.full(count, count)
+    reached = np.zeros(count)
+    reached[vertex] = 1
+    for ring in range(count):
+        new = (reached > 0) & (rings == count)
+        if not new.any():
+            break
+        rings[new] = ring
+        reached = joins @ (joins.T @ reached > 0).astype(float)
+    return rings

@@ -12,14 +12,16 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common import pns
-from pns_common.model.card import EDGE_FEATURES, FACE_FEATURES, VERTEX_FEATURES
-from pns_common.model.session import Model, PolygonModel
+from pns_common.model.card import DIRECTED_FORMAT, EDGE_FEATURES, FACE_FEATURES, VERTEX_FEATURES
+from pns_common.model.session import Model, Network, PolygonModel, networks
 from train.certificates.subject import Certificate
 from train.metrics.card import MEASURES
 
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
 SINGLE_PRECISION = 1 + 1e-6
 SAMPLES = 4096
+# Features of directed edges are turns, and lengths that level off at 3.
+WIDEST = math.pi
 
 # Percentage points between a card's improvement and the measured one: rounding on another
 # machine, no more.
@@ -28,6 +30,8 @@ POINTS = 0.05
 
 def keeps_its_word(model: Model) -> list[Certificate]:
     """Certify a model's answers at sample features and its card's metrics."""
+    if model.card.format == DIRECTED_FORMAT:
+        return [*(_finite(model, network) for network in networks(model.card)), _metrics(model)]
     rows = _answers(model, EDGE_FEATURES[model.card.features], "corrections")
     if model.card.vertex_features is not None:
         count = VERTEX_FEATURES[model.card.vertex_features]
@@ -47,6 +51,13 @@ def sample_features(count: int) -> Float[np.ndarray, "N K"]:
     extremes = [(x, side) for x in (0.0, 2.0) for side in (-350.0, -30.0, 0.0, 30.0, 350.0)]
     rows[-len(extremes) :] = [[x, *[side] * (count - 1)] for x, side in extremes]
     return rows
+
+
+def _finite(model: Model, network: Network) -> Certificate:
+    """Certify one network of directed edges: its rows are bounded, and so is no answer's length."""
+    rows = np.random.default_rng(0).uniform(-WIDEST, WIDEST, (SAMPLES, network.columns))
+    wrong = int((~np.isfinite(model.run(network.given, rows)).all(axis=1)).sum())
+    return Certificate("file", f"finite {network.answer}", wrong, 0, 0, f"of {SAMPLES} rows")
 
 
 def _answers(

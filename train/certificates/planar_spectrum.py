@@ -32,18 +32,19 @@ FINE = 5e-7
 
 FLAT = 1e-6
 EIGENVALUE = 1e-9
-# The same for scale-free rules: their gates are some hundred times as sharp, and the second and
-# third derivatives that finite differences see with them. A gate with a kink shows as 1e-2.
-SHARPER_FLAT, SHARPER_EIGENVALUE = 1e-4, 1e-6
+# The same for scale-free rules: their gates, tanh(c_v x), are sharper, and the second and third
+# derivatives that finite differences see with them. A gate with a kink shows as 1e-2.
+FLAT_BY_SHARPNESS, SHARPER_EIGENVALUE = 1e-7, 1e-6
 
 
 def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certificate]:
     """Certify T8 for each valence: the derivative, the tangent eigenvalues and the Reif gap."""
     deviations, tangents, gaps = [], [], []
     flat, finest = FLAT, EIGENVALUE
-    if subject.learned_once is not None:
-        flat, finest = SHARPER_FLAT, SHARPER_EIGENVALUE
-    base = subject.base
+    base, card = subject.base, subject.learned_once
+    if card is not None:
+        flat = FLAT_BY_SHARPNESS * (card.vertex_gate_sharpness or 0.0)
+        finest = SHARPER_EIGENVALUE
     for valence in valences:
         place = f"k = {valence}"
         size = spectrum(subject.exact, valence, base)

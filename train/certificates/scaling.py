@@ -131,8 +131,9 @@ def regular_smoothness(subject: Subject, torus: Mesh) -> Certificate:
 # In reference lengths; edges of the bodies are about 0.3 long.
 EPSILONS = 10.0 ** -np.arange(2, 8)
 
-# Gates of scale-free rules open within a few degrees: larger moves close and open them.
-SMALLER_EPSILONS = 10.0 ** -np.arange(4, 9)
+# Gates of scale-free rules open within a degree, and their guard acts by halves: larger moves
+# close and open them.
+SMALLER_EPSILONS = 10.0 ** -np.arange(5, 10)
 
 NEAR_ONE = 0.1
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from pns_common import pns
-from pns_common.model.card import DEFAULT_FORMAT, ModelCard
+from pns_common.model.card import PAPER_FORMAT, ModelCard
 from pns_common.model.session import Model
 from train.certificates.bases import CATMULL_CLARK, LOOP, Base
 from train.models.networks import BoundedNet
@@ -57,7 +57,7 @@ class Subject:
     def learned_once(self) -> ModelCard | None:
         """The card of a scheme that corrects the control mesh alone: then it is its base."""
         card = self.card
-        return card if card is not None and card.format == DEFAULT_FORMAT else None
+        return card if card is not None and card.format != PAPER_FORMAT else None
 
     @property
     def moves_curves(self) -> bool:

@@ -53,12 +53,14 @@ def creases_below(polygons: Polygons, creases: Creases) -> Creases:
     if named is None or not len(named) or not creases.sharp_at(1):
         return Creases(border=creases.border)
     mesh = polygons.mesh.topology()
-    sharpness = creases.sharpness
+    sharpness, corners = creases.sharpness, creases.soft_corners
+    new = np.zeros(len(mesh.edges) + mesh.face_count)
     return replace(
         creases,
         named=halves_of(mesh, mesh.rows_of(named)),
         sharpness=None if sharpness is None else np.repeat(sharpness, 2),
         levels=None if creases.levels is None else creases.levels - 1,
+        soft_corners=None if corners is None else np.concatenate([corners, new]),
     )
 
 

@@ -91,6 +91,7 @@ def _on_surface(control: ControlMesh, pairs: Int[np.ndarray, "N 2"]) -> Int[np.n
 def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Creases:
     """Return the edges that are found in each part of a union, by name."""
     named, sharpness, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0)], 0
+    corners = [np.zeros(0)]
     for mesh, _ in _jobs(
         control.mesh, parts.count_faces(control.cleaned.face_map >= 0), NO_CREASES
     ):
@@ -99,8 +100,15 @@ def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Cre
             named.append(first + found.named)
             own = found.sharpness
             sharpness.append(np.ones(len(found.named)) if own is None else own)
+        own = found.soft_corners
+        corners.append(np.zeros(len(mesh.vertices)) if own is None else own)
         first += len(mesh.vertices)
-    return Creases(np.concatenate(named), np.concatenate(sharpness), levels=scheme.creases.levels)
+    return Creases(
+        np.concatenate(named),
+        np.concatenate(sharpness),
+        levels=scheme.creases.levels,
+        soft_corners=np.concatenate(corners),
+    )
 
 
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
@@ -225,7 +233,10 @@ def _jobs(
         mesh = Mesh(union.vertices[vertex:vertex_end], union.faces[face:face_end] - vertex)
         own = slice(crease, crease_end)
         weights = None if sharpness is None else sharpness[own]
-        jobs.append((mesh, replace(creases, named=named[own] - vertex, sharpness=weights)))
+        corners = creases.soft_corners
+        corners = None if corners is None else corners[vertex:vertex_end]
+        chosen = {"named": named[own] - vertex, "sharpness": weights, "soft_corners": corners}
+        jobs.append((mesh, replace(creases, **chosen)))
         face, vertex, crease = face_end, vertex_end, crease_end
     return jobs
 

@@ -140,7 +140,8 @@ def soft_and_hard(lines: Creases) -> tuple[Creases, Creases]:
     if lines.named is None or lines.sharpness is None:
         return NO_CREASES, lines
     hard = lines.sharpness == 1
-    soft = Creases(lines.named[~hard], lines.sharpness[~hard], levels=lines.levels)
+    named, corners = lines.named[~hard], lines.soft_corners
+    soft = Creases(named, lines.sharpness[~hard], levels=lines.levels, soft_corners=corners)
     return soft, Creases(lines.named[hard], levels=lines.levels)
 
 

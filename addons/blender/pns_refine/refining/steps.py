@@ -62,7 +62,7 @@ class Steps:
     @cached_property
     def at_last(self) -> Topology:
         """The final topology with the creases that the last level kept sharp, for limits."""
-        soft = _halves(self.steps[-1].soft, self.steps[-1].topology)
+        soft = _halves(self.steps[-1].soft, self.steps[-1].topology, self.base)
         return with_creases(soft.applied_by_name(self.final), self.last_creases)
 
     @cached_property
@@ -112,7 +112,7 @@ def level_steps(
         topology = with_creases(soft.applied_by_name(plain), sharp)
         mixture = _mixture(plain, base, pairs, crease_sharpness, soft)
         steps.append(Step(topology, sharp, soft, mixture))
-        soft = _halves(soft, plain)
+        soft = _halves(soft, plain, base)
         pairs, crease_sharpness = _worn(plain, pairs, crease_sharpness)
         plain = base.split(plain, Blocks())
     return Steps(base, tuple(steps), plain, pairs, crease_sharpness)
@@ -165,12 +165,16 @@ def straight_level(
     return np.concatenate(made)
 
 
-def _halves(soft: Creases, topology: Topology) -> Creases:
+def _halves(soft: Creases, topology: Topology, base: BaseScheme) -> Creases:
     """Return the halves of edges that are named with their sharpness."""
     if soft.named is None or soft.sharpness is None:
         return NO_CREASES
-    halves = halves_of(topology, topology.rows_of(soft.named))
-    return replace(soft, named=halves, sharpness=np.repeat(soft.sharpness, 2))
+    halves, corners = halves_of(topology, topology.rows_of(soft.named)), soft.soft_corners
+    if corners is not None:
+        new = len(topology.edges) + (topology.face_count if base.polygons else 0)
+        corners = np.concatenate([corners, np.zeros(new)])
+    chosen = {"named": halves, "sharpness": np.repeat(soft.sharpness, 2), "soft_corners": corners}
+    return replace(soft, **chosen)
 
 
 def _mixture(

@@ -50,6 +50,11 @@ class WatchedModel:
         self.look_up()
         return cast(PolygonModel, self.model).face_correction(features, budget)
 
+    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
+        """Return the answers of a network of directed edges."""
+        self.look_up()
+        return self.model.run(given, rows)
+
     def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
         """Return the sharpness of a block of edges."""
         self.look_up()
