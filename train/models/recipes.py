@@ -211,5 +211,6 @@ RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
         "signed": signed,
         "general": general,
         "general-quad": general_quad,
+        "directed": directed,
     }
 )
