@@ -4,6 +4,7 @@ import multiprocessing
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import count as count_from_0
 from itertools import islice
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from jaxtyping import Float32
 
 from pns_common import Mesh
 from pns_common.files import replace_file
+from train.data.pairs.drawn import drawn_pair
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.polygons import polygon_stream
 from train.data.pairs.references import Pair
@@ -20,6 +22,9 @@ from train.data.shape_pairs import shape_pairs
 
 # Points of a procedural surface, at most.
 MOST_POINTS = 20_000
+
+# One in so many procedural pairs is drawn with few sides.
+DRAWN = 5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -83,7 +88,7 @@ def _keep_real(
     mark = folder / f"{seed}-{shape.name}{ending}.txt"
     if not mark.exists():
         made: list[str] = []
-        path = shapes / f"{shape.name}.npz"
+        path = shapes / TRAINING / f"{shape.name}.npz"
         for turn, pairs in enumerate(
             shape_pairs(path, shape.kind, seed * 1000 + number, polygons=polygons)
         ):
@@ -99,10 +104,17 @@ def _keep_procedural(folder: Path, count: int, seed: int, polygons: bool) -> lis
     ending = "quads" if polygons else "stream"
     paths = [folder / f"{seed}-{ending}-{number:05d}.npz" for number in range(count)]
     if not all(path.exists() for path in paths):
-        stream: Iterator[Pair] = (polygon_stream if polygons else pair_stream)(seed)
+        stream: Iterator[Pair] = (polygon_stream if polygons else _with_drawn)(seed)
         for path, pair in zip(paths, islice(stream, count), strict=True):
             _keep(path, [pair])
     return paths
+
+
+def _with_drawn(seed: int) -> Iterator[Pair]:
+    """Yield the stream's pairs, and a body of revolution in place of every fifth."""
+    rng, stream = np.random.default_rng(seed), pair_stream(seed)
+    for number in count_from_0():
+        yield drawn_pair(rng) if number % DRAWN == 0 else next(stream)
 
 
 def _keep(path: Path, pairs: Iterable[Pair]) -> None:

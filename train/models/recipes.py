@@ -171,7 +171,7 @@ def directed(seed: int = 0) -> Recipe:
                 mean=1.0, spread=0.5, peak=0.4, normal=2.0, worse=0.0, worse_from=0.95
             ),
             meshes=3,
-            real=0.65,
+            real=0.6,
             kinds={
                 "part": 0.32,
                 "scan": 0.15,
@@ -181,7 +181,7 @@ def directed(seed: int = 0) -> Recipe:
                 "building": 0.08,
                 "terrain": 0.08,
             },
-            procedural=700,
+            procedural=875,
             most_faces=1000,
         ),
         steps=6000,
