@@ -9,12 +9,11 @@ from jaxtyping import Float
 
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import read_mesh, welded
-from train.data.pairs.references import Pair, Reference
+from train.data.pairs.faceted import sampled
+from train.data.pairs.references import Pair
 from train.data.remeshers import REMESHERS, with_points
 from train.data.simplifiers import SIMPLIFIERS, Simplifier
-from train.metrics.surface_distance import surface_samples
 from train.surfaces.solids import random_rotation
-from train.vectors import face_normals
 
 # Points of a shape.
 POINTS = 40_000
@@ -84,7 +83,7 @@ def _simplified(
 ) -> list[Pair]:
     low, high = dense.vertices.min(axis=0), dense.vertices.max(axis=0)
     dense = with_points(dense, (dense.vertices - (low + high) / 2) / np.linalg.norm(high - low))
-    surface = sampled_surface(dense, rng)
+    surface = sampled(dense.vertices, dense.faces, rng, POINTS)
     made = []
     for name in names:
         ends = SIZES[:2] if rng.random() < SMALL else SIZES[1:]
@@ -98,12 +97,6 @@ def _simplified(
         if coarse.face_count >= FEWEST:
             made.append(Pair(f"{kind}/{name}", _shaken(coarse, noise, rng), surface))
     return made
-
-
-def sampled_surface(mesh: Mesh, rng: np.random.Generator) -> Reference:
-    """Return points spread evenly over a mesh, with the normals of its faces."""
-    points, faces = surface_samples(mesh, POINTS, rng)
-    return Reference(points, face_normals(mesh.vertices, mesh.faces)[faces])
 
 
 def _shaken(mesh: Mesh, noise: float, rng: np.random.Generator) -> Mesh:

@@ -129,13 +129,16 @@ def _hull(
 
 
 def sampled(
-    points: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], rng: np.random.Generator
+    points: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "F 3"],
+    rng: np.random.Generator,
+    samples: int = SAMPLES,
 ) -> Reference:
-    """Return points spread evenly by area, with their faces' normals."""
+    """Return so many points spread evenly by area, with their faces' normals."""
     a, b, c = (points[faces[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     area = np.linalg.norm(across, axis=1)
-    face = rng.choice(len(faces), SAMPLES, p=area / area.sum())
-    u, v = np.sort(rng.random((2, SAMPLES, 1)), axis=0)
+    face = rng.choice(len(faces), samples, p=area / area.sum())
+    u, v = np.sort(rng.random((2, samples, 1)), axis=0)
     on_faces = a[face] * u + b[face] * (v - u) + c[face] * (1 - v)
     return Reference(on_faces, across[face] / area[face, None])
