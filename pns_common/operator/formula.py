@@ -235,10 +235,10 @@ class Surroundings:
     """
 
     flat: Float[np.ndarray, "W 3"]
-    gates: tuple[Float[np.ndarray, "_"], ...]
-    bounds: tuple[Float[np.ndarray, "_"], ...]
-    lengths: tuple[Float[np.ndarray, "_"], ...]
-    rows: tuple[Integer[np.ndarray, "_"], ...]
+    gates: tuple[Float[np.ndarray, " _"], ...]
+    bounds: tuple[Float[np.ndarray, " _"], ...]
+    lengths: tuple[Float[np.ndarray, " _"], ...]
+    rows: tuple[Integer[np.ndarray, " _"], ...]
 
 
 def directed_level(level: Level, rule: DirectedRule) -> Additions:
