@@ -33,8 +33,8 @@ RUN cd / && /opt/pns/bin/pns doctor
 FROM python:3.13.14-slim-bookworm@sha256:67a1e1f215ccda113cfc024e8639049257e88f273898f595b61476d128d387e8
 COPY --from=build /opt/pns /opt/pns
 # One thread a library: the workers are the parallelism, and a pids limit counts threads.
-# For 1 GiB: at rest three workers take 146 MiB each and the server 55. Bodies and answers are memory
-# that no worker's end gives back: with all of them a job of PNS_MEMORY has room, and two that take
+# For 1 GiB: at rest two workers take 146 MiB each and the server 55. Bodies and answers are memory
+# that no worker's end gives back: with all bodies a job of PNS_MEMORY has room, and two that take
 # what was predicted where clients do not hold so much. With a larger --memory, raise these.
 ENV PATH=/opt/pns/bin:$PATH \
     PYTHONUNBUFFERED=1 \
@@ -45,9 +45,7 @@ ENV PATH=/opt/pns/bin:$PATH \
     PNS_PORT=8000 \
     PNS_METRICS_PORT=9000 \
     PNS_MEMORY=256MiB \
-    PNS_UPLOAD_BYTES=128MiB \
-    PNS_ANSWER_BYTES=128MiB \
-    PNS_QUEUE=2
+    PNS_QUEUE=4
 USER 10001:10001
 WORKDIR /tmp
 EXPOSE 8000 9000

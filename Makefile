@@ -113,7 +113,7 @@ soak: kernels
 # What the image installs, by hash: after a change of constraints.txt. It needs pip-tools.
 PIP_COMPILE := pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe --no-header --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --constraint constraints.txt
 hashes:
-	$(PIP_COMPILE) --extra service --extra store --extra tracing --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
+	$(PIP_COMPILE) --extra service --extra tracing --unsafe-package meshopt --output-file requirements/service.new pyproject.toml
 	$(PYTHON) requirements/without_ourselves.py requirements/service.new requirements/service.txt
 	$(PIP_COMPILE) --output-file requirements/build.txt requirements/build.in
 
@@ -197,7 +197,7 @@ $(SERVE)/.ready: pyproject.toml setup.py constraints.txt $(LOOPS)
 	@echo "Installing into $(SERVE), once: some 260 MB, a minute or two; the loops are compiled meanwhile"
 	$(PYTHON) -m venv $(SERVE)
 	$(SERVE)/bin/python -m pip install $(HASHED)
-	$(SERVE)/bin/python -m pip install --quiet --editable '.[service,store$(if $(JIT),$(comma)jit)]'
+	$(SERVE)/bin/python -m pip install --quiet --editable '.[service$(if $(JIT),$(comma)jit)]'
 	touch $@
 
 # The generator of Python clients, for their test.

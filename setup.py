@@ -30,7 +30,8 @@ class BuildLoops(build_ext):
         self.force = True
         folder = Path(self.build_temp) / "loops"
         command = [sys.executable, "-P", KERNELS / "ahead.py", folder]
-        subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": str(Path.cwd())})
+        path = os.pathsep.join([str(Path.cwd()), *sys.path])
+        subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": path})
         ext.include_dirs = [str(folder), np.get_include()]
         ext.extra_objects = sorted(map(str, folder.glob("*.o")))
         super().build_extension(ext)

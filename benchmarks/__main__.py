@@ -18,8 +18,10 @@ from rich.table import Table
 
 from benchmarks.contest import OURS, Case, contest, ours
 from benchmarks.generated import ORDERS
+from benchmarks.memory import MIB
 from benchmarks.peers.available import available_peers
 from benchmarks.plot import plot_results
+from benchmarks.startup import startup, startup_table
 from pns_common.files import replace_file
 from pns_common.model.file import DEFAULT_MODEL, bundled_models
 
@@ -33,6 +35,8 @@ CASES = (
     Case("quads", 300_000),
 )
 THIS = sys.executable
+# Control faces of the smaller mesh of the table of growth: 80,000 are made of them.
+GROWS_FROM = 20_000
 # Not one word wider than needed in a file or a pipe.
 FILE_WIDTH = 150
 
@@ -57,6 +61,8 @@ def main(
     # With the report that no other library makes, and without.
     methods = [f"{name}{report}" for name in names for report in ("", "+report")]
     commands = {f"pns {method}": ours(method, python) for method in methods} | peers
+    at_once = startup(python)
+    console.print(startup_table(at_once))
     done: list[dict[str, Any]] = []
     speed: dict[str, float] = {}
     for case in CASES:
@@ -70,9 +76,28 @@ def main(
         done.append(contested)
         console.print(case_table(contested))
         if write:
-            result = {"machine": machine(), "missing": missing, "cases": done}
+            result = {
+                "machine": machine(),
+                "missing": missing,
+                "startup": at_once,
+                "cases": done,
+            }
             replace_file(RESULTS, (json.dumps(result, indent=1) + "\n").encode())
             plot_results(result, PICTURE)
+    console.print(growth_table(done))
+
+
+def growth_table(done: list[dict[str, Any]]) -> Table:
+    """Return how many times longer a face takes at the largest size than at another one."""
+    closed = [case for case in done if case["order"] == "closed" and case["levels"] == 1]
+    small, large = ([c for c in closed if c["faces"] >= GROWS_FROM] or closed)[0], closed[-1]
+    title = f"time of a face: {large['faces']:,} faces over {small['faces']:,}"
+    table = Table("method", "median", "processor", title=title)
+    for name in [name for name in small["methods"] if name in large["methods"]]:
+        first, last = small["methods"][name], large["methods"][name]
+        by = first["made_faces"] / last["made_faces"]
+        table.add_row(name, *(f"{last[k] / first[k] * by:.2f}" for k in ("median", "processor")))
+    return table
 
 
 def case_table(contested: dict[str, Any]) -> Table:
@@ -80,7 +105,16 @@ def case_table(contested: dict[str, Any]) -> Table:
     peers = {n: m for n, m in contested["methods"].items() if not n.startswith(OURS)}
     title = f"{contested['order']}, {contested['faces']:,} faces × {contested['levels']}"
     table = Table(title=f"{title} (load {contested['load']})")
-    columns = ("method", "cold s", "first s", "median s", "least", "most", "processor s", "MiB")
+    columns = (
+        "method",
+        "cold s",
+        "first s",
+        "median s",
+        "least",
+        "most",
+        "processor s",
+        "bytes a face",
+    )
     for column in columns:
         table.add_column(column, justify="left" if column == "method" else "right")
     table.add_column("fastest peer / it", justify="right")
@@ -90,8 +124,9 @@ def case_table(contested: dict[str, Any]) -> Table:
     for name, m in contested["methods"].items():
         ratio = f"{fastest / m['median']:.2f}" if fastest else "–"
         keys = ("cold", "first", "median", "least", "most", "processor")
+        space = m["mib"] * MIB / contested["faces"]
         effort = f"{least / m['processor']:.2f}" if least else "–"
-        table.add_row(name, *(f"{m[k]:.3f}" for k in keys), f"{m['mib']:.0f}", ratio, effort)
+        table.add_row(name, *(f"{m[k]:.3f}" for k in keys), f"{space:.0f}", ratio, effort)
     for name, reason in contested["left_out"].items():
         table.add_row(name, *["–"] * 7, reason)
     return table

@@ -8,12 +8,14 @@ from typing import Any
 
 import msgspec
 
+from export.directed_graph import directed_bytes
 from export.onnx_graph import model_bytes
-from export.parity import TOLERANCE, Parity, check_parity, check_sharpness
+from export.parity import TOLERANCE, Parity, check_directed, check_parity, check_sharpness
 from pns_common.files import replace_file
-from pns_common.model.card import DEFAULT_FORMAT, PAPER_FORMAT, ModelCard
+from pns_common.model.card import DEFAULT_FORMAT, DIRECTED_FORMAT, PAPER_FORMAT, ModelCard
 from pns_common.model.file import model_from_bytes
 from train.models.checkpoint import Checkpoint
+from train.models.directed import DirectedNet
 from train.models.networks import BoundedNet, SharpNet
 
 
@@ -32,9 +34,12 @@ def export_model(checkpoint: Checkpoint, path: Path) -> Exported:
         ParityError: the file would not say what the network says; nothing is written.
         ModelError: the file would break the model contract; nothing is written.
     """
+    card = checkpoint_card(checkpoint)
+    if isinstance(checkpoint.network, DirectedNet):
+        return write_directed(checkpoint.network, card, path)
     return write_model(
         checkpoint.network,
-        checkpoint_card(checkpoint),
+        card,
         path,
         vertex_network=checkpoint.vertex_network,
         sharpness_network=checkpoint.sharpness_network,
@@ -62,6 +67,16 @@ def write_model(
     return Exported(model.hash, parity)
 
 
+def write_directed(network: DirectedNet, card: ModelCard, path: Path) -> Exported:
+    """Write a network of directed edges under a card; raises as `export_model` does."""
+    data = directed_bytes(network, card)
+    model = model_from_bytes(data, name=path.stem)
+    parity = check_directed(model, network)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, data)
+    return Exported(model.hash, parity)
+
+
 # What stands on a card about training, and in what order.
 ORDER = (
     "recipe",
@@ -71,6 +86,11 @@ ORDER = (
     "weights",
     "steps",
     "batch_size",
+    "meshes",
+    "real",
+    "kinds",
+    "procedural",
+    "most_faces",
     "faces",
     "pool",
     "reuse",
@@ -96,6 +116,12 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
         name: recipe.pop(name) for name in ("features", "gate_sharpness", "budget", "orientation")
     }
     vertex, form = checkpoint.recipe.vertex, checkpoint.recipe.scale_free
+    directed, version = checkpoint.recipe.directed, PAPER_FORMAT if form is None else DEFAULT_FORMAT
+    if directed is not None:
+        version, own = DIRECTED_FORMAT, recipe.pop("directed")
+        # What the rule says stands once.
+        on_card |= own | {"boundary_strength": own.pop("curve_strength")}
+        recipe["hidden"] = on_card.pop("hidden")
     if vertex is not None:
         on_card["vertex_features"] = recipe["vertex"].pop("features")
         on_card["vertex_gate_sharpness"] = recipe["vertex"].pop("gate_sharpness")
@@ -112,7 +138,7 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     # In the order of the first models' cards, without what a recipe leaves out.
     given = {name: facts[name] for name in ORDER if facts.get(name) is not None}
     return ModelCard(
-        format=PAPER_FORMAT if form is None else DEFAULT_FORMAT,
+        format=version,
         training=given,
         metrics=checkpoint.metrics,
         **on_card,

@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from pns_common.errors import ModelError, PnsError
 from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS, Feature
-from pns_common.model.session import OnnxModel
+from pns_common.model.session import OnnxModel, networks
+from train.models.directed import DirectedNet
 from train.models.networks import BoundedNet, SharpNet
 
 # Largest difference allowed, as a fraction of the budget and of the row's largest feature.
@@ -20,6 +21,9 @@ from train.models.networks import BoundedNet, SharpNet
 # bundled networks the default's rounds most, by 1.4e-6: it was trained longest, and its weights
 # are largest.
 TOLERANCE = 3e-6
+
+# Of networks of directed edges, as a fraction of the largest answer.
+DIRECTED_TOLERANCE = 3e-6
 
 ROWS = 10_000
 BUDGETS = (1e-6, 0.1, 0.5, 1.0, 1e3)
@@ -141,3 +145,24 @@ def sample_features(count: int) -> Float[np.ndarray, "N K"]:
     rows[-3:, 0] = [0.0, 1.0, 2.0]
     rows[-3:, 1:] = [[0.0] * (count - 1), [30.0] * (count - 1), [-30.0] * (count - 1)]
     return rows.astype(np.float32)
+
+
+def check_directed(
+    model: OnnxModel, network: DirectedNet, tolerance: float = DIRECTED_TOLERANCE
+) -> Parity:
+    """Check each network of a file of directed edges on random rows; return what differs most.
+
+    Raises:
+        ParityError: an answer differs by more than `tolerance` of the largest one.
+    """
+    layers = [network.encoder, *network.rounds, network.heads]
+    rng, largest = np.random.default_rng(0), 0.0
+    with torch.no_grad():
+        for held, layer in zip(networks(model.card), layers, strict=True):
+            rows = rng.normal(size=(ROWS, held.columns)).astype(np.float32)
+            true = layer(torch.from_numpy(rows)).numpy()
+            difference = np.abs(model.run(held.given, rows) - true).max() / np.abs(true).max()
+            largest = max(largest, float(difference))
+    if not largest <= tolerance:
+        raise ParityError(budget=1.0, difference=largest, tolerance=tolerance)
+    return Parity(difference=largest, length=0.0)

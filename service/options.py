@@ -11,6 +11,8 @@ from pns_common.scheme_names import BASE_SCHEMES
 
 from .errors import InvalidParameter, check_choice
 
+# Of the environment's variables that are settings.
+PREFIX = "PNS_"
 MAX_LEVELS = 6
 # The library's, without its import (tests hold them equal).
 DEFAULT_LEVELS = 2

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     ByteSize,
     Field,
@@ -19,10 +18,10 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from .options import MAX_LEVELS, Limits
+from .options import MAX_LEVELS, PREFIX, Limits
 
 MIB = 1024**2
-PREFIX = "PNS_"
+LIMITS = Limits()
 # Two names of settings are a misspelling apart from this ratio of equal letters on (difflib).
 ALIKE = 0.7
 
@@ -78,16 +77,8 @@ def _host(text: str) -> str:
     return text.lower()
 
 
-def _store(text: str) -> str:
-    if not text.startswith(("redis://", "rediss://", "unix://")):
-        # Not what it is: it may hold a password.
-        raise ValueError("it is no address of a Redis, such as redis://HOST:6379/0")
-    return text
-
-
 Size = Annotated[ByteSize, BeforeValidator(_whole_size), Field(gt=0, le=_MOST_BYTES)]
 Seconds = Annotated[float, Field(gt=0)]
-Store = Annotated[str, AfterValidator(_store)]
 Name = Annotated[str, BeforeValidator(_not_empty)]
 Place = Annotated[Path, BeforeValidator(_not_empty)]
 Networks = Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_networks)]
@@ -148,15 +139,6 @@ class Settings(BaseSettings):
                 )
         return values
 
-    @model_validator(mode="after")
-    def _refuse_bodies_that_never_fit(self) -> Settings:
-        if self.upload_bytes is not None and self.upload_bytes * 3 // 4 < self.body:
-            raise ValueError(
-                "PNS_UPLOAD_BYTES must be a third more than PNS_BODY: one client may have three "
-                "quarters of it"
-            )
-        return self
-
     ignore_unknown: bool = Field(
         default=False, description="pass over PNS_… variables that resemble no setting"
     )
@@ -176,67 +158,35 @@ class Settings(BaseSettings):
     )
 
     body: Size = Field(default=ByteSize(64 * MIB), description="largest request body")
-    faces: int = Field(default=5_000_000, gt=0, description="most faces predicted in an answer")
+    faces: int = Field(
+        default=LIMITS.max_faces, gt=0, description="most faces predicted in an answer"
+    )
     levels: int = Field(default=MAX_LEVELS, ge=1, le=MAX_LEVELS, description="deepest level")
     memory: Size = Field(
-        default=ByteSize(4096 * MIB), description="most memory predicted for one job"
+        default=ByteSize(LIMITS.max_memory_bytes), description="most memory predicted for one job"
     )
     json_items: int = Field(
-        default=2_000_000, gt=0, description="most structural characters in a glTF's JSON"
+        default=LIMITS.max_json_items,
+        gt=0,
+        description="most structural characters in a glTF's JSON",
     )
 
     workers: int = Field(default_factory=_worker_default, ge=1, description="worker processes")
-    queue: int = Field(default=8, ge=0, description="requests that may wait beside those that run")
-    queue_seconds: Seconds = Field(
-        default=600, description="longest wait of a job that nobody holds a connection for"
+    queue: int = Field(
+        default=8,
+        ge=0,
+        description="requests that may be here beside those that run: that send, wait, or take "
+        "their answer",
     )
-    short_seconds: Seconds = Field(
-        default=0.5,
-        description="jobs predicted to take no longer have a worker to themselves",
+    client_requests: int = Field(
+        default=6, gt=0, description="requests that one client may have here"
     )
     faces_per_minute: float | None = Field(
         default=20_000_000,
         gt=0,
         description="refined faces that one client may ask for in a minute",
     )
-    result_seconds: Seconds = Field(default=900, description="how long the result of a job is kept")
-    promised_seconds: Seconds = Field(
-        default=300, description="how long at least a result stays that nobody has fetched"
-    )
-    result_bytes: Size = Field(
-        default=ByteSize(1024 * MIB), description="what the results that are kept may take"
-    )
-    results: int = Field(
-        default=256,
-        gt=0,
-        description="jobs that are kept after their end, with or without a result",
-    )
-    result_folder: Place | None = Field(
-        default=None, description="where results are kept; none: the system's temporary folder"
-    )
-    store: Store | None = Field(
-        default=None,
-        description="Redis that replicas share, whichever a client asks for its job; none: each "
-        "replica answers for its own",
-    )
-    store_files: Name | None = Field(
-        default=None,
-        description="where bodies and results of shared jobs lie, as fsspec names it "
-        "(s3://bucket/folder); none: in Redis",
-    )
-    answer_bytes: Size = Field(
-        default=ByteSize(1024 * MIB), description="answers in memory that clients are taking"
-    )
-    upload_bytes: Size | None = Field(
-        default=None,
-        description="what all bodies may take in memory, until the ends of their jobs; none: "
-        "`body` for each job that runs or waits",
-    )
-    uploads: int = Field(default=512, gt=0, description="bodies that may arrive at the same time")
-
-    connections: int = Field(
-        default=512, gt=0, description="open connections; beyond those idle ones end, then 503"
-    )
+    connections: int = Field(default=512, gt=1, description="open connections; beyond those 503")
     proxies: Networks = Field(
         default=(),
         description="addresses and networks whose Forwarded headers are believed, with commas",
@@ -263,37 +213,15 @@ class Settings(BaseSettings):
     idle_seconds: Seconds = Field(
         default=10, description="longest wait for the next piece of a body"
     )
-    head_seconds: Seconds = Field(
-        default=10, description="longest time that a connection asks for nothing"
-    )
-    keep_alive_seconds: Seconds = Field(
-        default=5, description="how long a connection may rest between requests"
+    keep_alive_seconds: int = Field(
+        default=5, gt=0, description="how long a connection may rest between requests"
     )
     stall_seconds: Seconds = Field(
         default=30, description="longest wait for a client to take more of its answer"
     )
-    grace_seconds: Seconds = Field(
-        default=10, description="how far a client may fall behind `rate`"
+    drain_seconds: int = Field(
+        default=75, gt=0, description="longest wait for running requests after SIGTERM"
     )
-    rate: Size = Field(
-        default=ByteSize(8 * 1024),
-        description="bytes a second that a body, and an answer, must move on average",
-    )
-    drain_seconds: Seconds = Field(
-        default=75, description="longest wait for running requests after SIGTERM"
-    )
-
-    @property
-    def slots(self) -> int:
-        """Requests that run or wait."""
-        return self.workers + self.queue
-
-    @property
-    def all_bodies(self) -> int:
-        """Bytes of all bodies together."""
-        # Two at least: of which one client may hold one and a half.
-        each_slot = max(self.slots, 2) * int(self.body)
-        return each_slot if self.upload_bytes is None else int(self.upload_bytes)
 
     def job_limits(self) -> Limits:
         """Return what one job may cost, as the pipeline checks it."""

@@ -75,7 +75,6 @@ LONGEST = (
     "test_wheel.py",
     "conformance/test_conformance.py",
     "train/test_reproduce.py",
-    "service/http/test_jobs.py",
     "service/http/test_crossed_answers.py",
     "service/http/test_openapi.py",
     "soak/test_soak.py",

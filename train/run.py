@@ -16,6 +16,10 @@ COMMANDS = {
         "train.fitting.command:train_command",
         "Train a recipe, write its checkpoint and print the held-out table.",
     ),
+    "shapes": (
+        "train.data.shape_library:shapes_command",
+        "Fill a folder with the shapes that are trained and validated on, from a local copy.",
+    ),
     "reproduce": (
         "train.experiments.command:reproduce_command",
         "Make the paper's tables and figures again, and those that it leaves open.",

@@ -5,8 +5,8 @@ say their types: ``f8_2d`` is a C-contiguous array of float64 of two axes, ``int
 ``bool`` are numbers; ``f4_2d | f8_2d`` stands for a loop each. The small functions of scalars and
 3-vectors that its body is made of are decorated with ``inlined`` and need no types.
 
-All loops are compiled when the package is built (ahead.py), into ``compiled``. Where that
-is missing, or older than a source here, or PNS_JIT=1 is set, numba compiles each loop at its first
+All loops are compiled when the package is built (ahead.py), into ``compiled``. Where that is
+missing, or older than a source here, or KERNELS_JIT=1 is set, numba compiles each loop at its first
 call. Both give the same bits. No fast-math: nothing is reordered or contracted.
 
 Loops over edges, faces or vertices take ``begin`` and ``end`` and write their own rows only, so
@@ -28,7 +28,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 # 1: let numba compile each loop at its first call; ahead.py says "ahead".
-JIT = os.environ.get("PNS_JIT", "")
+JIT = os.environ.get("KERNELS_JIT", "")
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ b1_1d, b1_2d = ArrayType("b1", 1), ArrayType("b1", 2)
 
 
 def sources_digest() -> str:
-    """Return the SHA-256 of the sources of the loops."""
+    """Return the SHA-256 of the sources of the loops, those in Python."""
     digest = hashlib.sha256()
-    for path in sorted(HERE.glob("*.[ch]")) + sorted(HERE.glob("*.py")):
+    for path in sorted(HERE.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -23,7 +23,9 @@ from typing import Any
 
 # Before numba is imported: code for every processor of the architecture, which gives the same bits,
 # and optimised once, here.
-os.environ.update(PNS_JIT="ahead", NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", NUMBA_OPT="0")
+os.environ.update(
+    KERNELS_JIT="ahead", NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", NUMBA_OPT="0"
+)
 
 import llvmlite.binding as llvm
 import numpy as np

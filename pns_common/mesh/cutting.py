@@ -7,6 +7,7 @@ too: a neighbour may end there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -326,18 +327,39 @@ def _with_straight_corners(
 
 
 def _fan_without_flat(outline: list[int], points: Float[np.ndarray, "n 2"]) -> list[list[int]]:
-    """Cut a triangle with more corners on its sides into triangles that have an area."""
+    """Cut a triangle with more corners on its sides into triangles that have an area.
+
+    The largest ear of a convex outline leaves the corners on its sides to the others. Ears are
+    kept in a heap: O(n log n).
+    """
+    count = len(outline)
+    before, after = [k - 1 for k in range(count)], [k + 1 for k in range(count)]
+    before[0], after[-1] = count - 1, 0
+    version = [0] * count
+    places = [points[corner].tolist() for corner in outline]
+
+    def ear(k: int) -> tuple[float, int, int]:
+        (a, b), (c, d), (e, f) = places[before[k]], places[k], places[after[k]]
+        return -abs((c - a) * (f - b) - (e - a) * (d - b)), k, version[k]
+
+    ears = [ear(k) for k in range(count)]
+    heapify(ears)
     made: list[list[int]] = []
-    ring = list(outline)
-    while len(ring) > 3:
-        corners = np.array(
-            [[ring[k - 1], ring[k], ring[(k + 1) % len(ring)]] for k in range(len(ring))]
-        )
-        # The largest ear of a convex outline leaves the corners on its sides to the others.
-        best = int(np.abs(_areas(points, corners)).argmax())
-        made.append(corners[best].tolist())
-        del ring[best]
-    return [*made, ring]
+    last = 0
+    while count > 3:
+        _, k, seen = heappop(ears)
+        if seen != version[k]:
+            continue
+        left, right = before[k], after[k]
+        made.append([outline[left], outline[k], outline[right]])
+        version[k] += 1
+        after[left], before[right] = right, left
+        for neighbour in (left, right):
+            version[neighbour] += 1
+            heappush(ears, ear(neighbour))
+        last, count = left, count - 1
+    rest = sorted((before[last], last, after[last]))
+    return [*made, [outline[k] for k in rest]]
 
 
 def _areas(

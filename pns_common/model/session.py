@@ -68,8 +68,12 @@ class Model(Protocol):
         """Return the sharpness of edges, (N, 1); where the card names features for it alone."""
         ...
 
+
+class DirectedModel(Model, Protocol):
+    """A model of directed edges (format 5): several networks, each named by what it reads."""
+
     def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
-        """Return the answers of a network of directed edges; format 5 alone."""
+        """Return the answers of the network that reads the input ``given``."""
         ...
 
 

@@ -18,7 +18,7 @@ from pns_common.mesh.mesh import Mesh
 from pns_common.model.card import DIRECTED_FORMAT, PAPER_FORMAT
 from pns_common.model.features import FEATURE_SETS
 from pns_common.model.file import COMPANIONS, companion_of, load_model
-from pns_common.model.session import Model, PolygonModel, heads_of, networks
+from pns_common.model.session import DirectedModel, Model, PolygonModel, heads_of, networks
 from pns_common.operator.directed import DirectedNetworks
 from pns_common.operator.formula import DirectedRule, Rule
 from pns_common.parallel import Blocks
@@ -226,7 +226,7 @@ def _directed_scheme(
 
 
 def _run(model: Model, given: str, rows: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N A"]:
-    return model.run(given, rows)
+    return cast(DirectedModel, model).run(given, rows)
 
 
 def _given(model: Model, name: str) -> float:

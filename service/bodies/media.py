@@ -12,6 +12,7 @@ GLB = "model/gltf-binary"
 GLTF = "model/gltf+json"
 JSON = "application/json"
 MULTIPART = "multipart/form-data"
+MIXED = "multipart/mixed"
 ZIP = "application/zip"
 
 # As their names end.

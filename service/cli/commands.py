@@ -19,6 +19,7 @@ from .parameters import (
     EngineOption,
     ModelOption,
     WorkersOption,
+    job_limits,
     local_path,
     options_of,
     takes_options,
@@ -116,11 +117,10 @@ def subdivide(
 ) -> None:
     """Refine each IN; formats go by the files' endings."""
     from ..meshfiles.convert import Jobs, convert
-    from ..settings import Settings
 
     jobs = Jobs(sources, output, report, map_, to, read_as, force)
     failed = 0
-    for error in convert(jobs, options_of(context), model, Settings().job_limits()):
+    for error in convert(jobs, options_of(context), model, job_limits()):
         if len(sources) == 1 or explained(error) is None:
             raise error
         failed = failed or _tell(error)

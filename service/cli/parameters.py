@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 import typer
 from typer.models import OptionInfo
 
-from ..options import DESCRIPTIONS, Options
+from ..options import DESCRIPTIONS, PREFIX, Limits, Options
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
@@ -123,3 +124,12 @@ AddressOption = Annotated[
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, help="workers at a time; default: one for each processor")
 ]
+
+
+def job_limits() -> Limits:
+    """Return what one job may cost; settings, slow to load, are read where some are set."""
+    if not any(name.upper().startswith(PREFIX) for name in os.environ):
+        return Limits()
+    from ..settings import Settings
+
+    return Settings().job_limits()

@@ -1,1 +1,1 @@
-"""The application: routes, admission, limits on bodies, problem documents, the server."""
+"""The application: routes, the way of a job, answers, problem documents, the server."""

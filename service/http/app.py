@@ -8,41 +8,44 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
-from starlette.types import ASGIApp
+from fastapi.routing import APIRoute
+from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import ServiceError
 from ..settings import Settings
 from ..workers import jobs
-from ..workers.budget import FacesBudget
-from ..workers.catalogue import Catalogue
-from ..workers.costs import Cost
-from ..workers.desk import Desk
 from ..workers.jobs import Done, Work
+from ..workers.models import Catalogue
 from ..workers.pool import Workers
-from ..workers.turns import Lane, Turns
-from . import layers, openapi, pages, problems, routes
-from .access.keys import read_keys
-from .access.origins import is_loopback
-from .admission import Admission
-from .jobs import routes as job_routes
-from .jobs.book import JobBook
-from .jobs.shared import SharedJobs
-from .jobs.store import JobStore
-from .room import BEYOND, connections_that_fit, with_results_that_fit
-from .service import ReadOnce, Service
+from . import openapi, pages, problems, routes
+from .access.keys import Bearer, Entry, read_keys
+from .access.origins import Origins, hosts_of, is_loopback
+from .jobs import Service
+from .watch.journal import Journal
 from .watch.metrics import Metrics
-from .watch.tracing import tracer_from_environment
+from .watch.tracing import record, tracer_from_environment
+
+if TYPE_CHECKING:
+    from opentelemetry.trace import Tracer
+
+    from pns_common.model.session import Model
 
 log = logging.getLogger("pns.service")
 
 # How often a service that starts looks whether its workers are ready.
 READY_SECONDS = 0.1
-
-if TYPE_CHECKING:
-    from pns_common.model.session import Model
+# What a page of another origin may send, beside what any may: all that is read here.
+TAKEN = (
+    *("Authorization", "Content-Encoding", "Content-Type", "If-None-Match"),
+    *("Traceparent", "Tracestate", "X-Request-ID"),
+)
+# What it may read of an answer beside its body.
+EXPOSED = ("ETag", "Retry-After", "Server-Timing", "X-Request-ID")
 
 
 def create_app(
@@ -50,85 +53,50 @@ def create_app(
     model: Model | None = None,
     *,
     job: Callable[[Work], Done] = jobs.subdivide,
-    measure: Callable[[Work], Cost] = jobs.measure,
     warm_up: Callable[[Model | str | None], None] | None = None,
     catalogue: Callable[[], Catalogue] = jobs.catalogue,
 ) -> FastAPI:
     """Create the application, with worker processes that live as long as its lifespan.
 
     `settings` None reads the environment; `model` None loads `settings.model`. `job` is what a
-    worker calls for each job, `measure` what it calls to predict its cost, `warm_up` what it calls
-    once, before (None: `jobs.warm_up`), `catalogue` what one of them calls once, later. A model
-    that does not load leaves the service up: /readyz says 503, scheme=loop and the other models
-    work. Raises KeysError where the file of keys cannot be used, TracingError where traces cannot
-    be sent.
+    worker calls for each job, `warm_up` what it calls once, before (None: `jobs.warm_up`),
+    `catalogue` what one of them calls once, later. A model that does not load leaves the service
+    up: /readyz says 503, scheme=loop and the other models work. Raises KeysError where the file of
+    keys cannot be used, TracingError where traces cannot be sent.
     """
-    settings = with_results_that_fit(settings or Settings())
-    most = connections_that_fit(settings)
+    settings = settings or Settings()
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
-    workers = {
-        Lane.ANY: Workers(settings.workers, settings.job_seconds, warm),
-        Lane.SHORT: Workers(1, settings.job_seconds, warm),
-    }
-    desk = Desk(
-        workers,
-        Turns(settings.workers, settings.queue, settings.short_seconds),
-        FacesBudget(),
-        run=job,
-        measure=measure,
-        job_seconds=settings.job_seconds,
-    )
-    book = JobBook(
-        seconds=settings.result_seconds,
-        promised_seconds=min(settings.promised_seconds, settings.result_seconds),
-        max_bytes=int(settings.result_bytes),
-        max_jobs=settings.results,
-    )
-    admission = Admission(
-        uploads=settings.uploads,
-        body_bytes=settings.all_bodies,
-        answer_bytes=int(settings.answer_bytes),
-    )
-
+    workers = Workers(settings.workers, settings.job_seconds, warm)
     metrics = Metrics()
-    _show(metrics, desk)
+    service = Service(settings, workers, job, catalogue, metrics.job, metrics.catalogue)
+    metrics.gauge("pns_requests_held", "Requests under way", lambda: service.places.taken.total())
+    metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: workers.waiting)
+    metrics.gauge("pns_jobs_running", "Jobs that run or end", lambda: workers.held.total())
+    metrics.restarts(lambda: workers.restarts)
     tracer = tracer_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        if keys is None and not is_loopback(settings.host):
-            log.warning("open to everybody: no PNS_KEYS_FILE is set")
-        elif keys is not None:
+        if keys is not None:
             log.info("open to the bearers of %d keys", len(keys))
-        if not settings.proxies and not is_loopback(settings.host):
-            log.warning(
-                "no PNS_PROXIES are set: an address may connect and ask as often as it likes"
-            )
-        for pool in workers.values():
-            pool.start()
-        shared = service.shared
-        beside = []
-        if shared is not None:
-            log.info("jobs are shared with other replicas; this one is %s", shared.store.replica)
-            beside.append(asyncio.create_task(shared.adopt_for_ever()))
-        if warm_up is None:
-            # Stand-ins load no model.
-            beside.append(asyncio.create_task(_tell_when_ready(service)))
-        # A proxy sends requests to every replica whose port is open: they would wait for its model.
-        while shared is not None and not (desk.ready or admission.draining):
-            await asyncio.sleep(READY_SECONDS)
+        elif not is_loopback(settings.host):
+            log.warning("open to everybody: no PNS_KEYS_FILE is set")
+        if not is_loopback(settings.host):
+            if not settings.hosts:
+                log.warning("asked under any name: no PNS_HOSTS are set")
+            if not settings.proxies:
+                log.warning("no PNS_PROXIES are set: without a proxy it is for a trusted network")
+        workers.start()
+        # Stand-ins load no model.
+        told = asyncio.create_task(_tell_when_ready(service)) if warm_up is None else None
         try:
             yield
         finally:
-            for task in beside:
-                task.cancel()
-            await book.close()
-            if shared is not None:
-                await shared.store.close()
-            for pool in workers.values():
-                await pool.stop()
+            if told is not None:
+                told.cancel()
+            await workers.stop()
 
     app = _Layered(
         title="PNS",
@@ -146,24 +114,17 @@ def create_app(
     )
     # Whoever names a route puts this before it; requests come without it.
     app.root_path = settings.prefix
-    app.layers = lambda routes: layers.around(
-        routes, settings, most + BEYOND, admission, metrics, keys, tracer
-    )
-    app.state.most = most
-    app.state.admission = admission
-    app.state.desk = desk
+    app.layers = lambda routes: around(routes, settings, metrics, keys, tracer)
     app.state.metrics = metrics
+    app.state.service = service
     problems.install(app)
-    models = ReadOnce(workers[Lane.SHORT], admission, catalogue, metrics.catalogue)
-    service = Service(settings, desk, admission, models, book)
-    if settings.store is not None:
-        service.shared = SharedJobs(service, JobStore(settings))
-    text = "Whether the store of jobs answers; 1 without one"
-    metrics.gauge("pns_store_up", text, lambda: service.shared is None or service.shared.reached)
-    text = "Results that are kept here, none with a store"
-    metrics.gauge("pns_result_bytes", text, lambda: book.bytes)
-    routers = [routes.router(service), job_routes.router(service), pages.router(settings.prefix)]
+    routers = [routes.router(service), pages.router(settings.prefix)]
     for router in routers:
+        for route in [*router.routes]:
+            if isinstance(route, APIRoute) and route.methods == {"GET"}:
+                # Uvicorn sends the head alone.
+                more: dict[str, Any] = {"methods": ["HEAD"], "include_in_schema": False}
+                router.add_api_route(route.path, route.endpoint, **more)
         app.include_router(router)
     # For the journal: what a layer refuses reaches none of them.
     app.state.routes = [route for router in routers for route in router.routes]
@@ -171,21 +132,46 @@ def create_app(
     return app
 
 
+def around(
+    routes: ASGIApp,
+    settings: Settings,
+    metrics: Metrics,
+    keys: list[Entry] | None,
+    tracer: Tracer | None = None,
+) -> ASGIApp:
+    """Lay around the routes everything that is done for every request.
+
+    `keys` None: it is open to everybody; `tracer` None: nothing is traced.
+    """
+    app = routes
+    if keys is not None:
+        app = Bearer(app, keys)
+    app = Origins(app, settings.cors_origins)
+    if settings.cors_origins:
+        app = CORSMiddleware(
+            app,
+            allow_origins=settings.cors_origins,
+            allow_methods=["GET", "POST"],
+            allow_headers=TAKEN,
+            expose_headers=EXPOSED,
+        )
+    app = TrustedHostMiddleware(app, hosts_of(settings), www_redirect=False)
+    spans = [] if tracer is None else [partial(record, tracer)]
+    app = Journal(app, metrics.request, *spans)
+
+    async def requests(scope: Scope, receive: Receive, send: Send) -> None:
+        await (app if scope["type"] == "http" else routes)(scope, receive, send)
+
+    return requests
+
+
 async def _tell_when_ready(service: Service) -> None:
     """Log that the workers are ready, and read the models, which the metrics show."""
-    while not service.desk.ready:
+    while not service.workers.ready:
         await asyncio.sleep(READY_SECONDS)
-    log.info("ready: %d workers have loaded the model", service.settings.workers + 1)
+    log.info("ready: a worker has loaded the model")
     with suppress(ServiceError):
-        await service.models.get()
-
-
-def _show(metrics: Metrics, desk: Desk) -> None:
-    """Set what the metrics say of jobs."""
-    desk.watchers.append(metrics.job)
-    metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: desk.waiting)
-    metrics.gauge("pns_jobs_running", "Jobs that run or are measured", lambda: desk.running)
-    metrics.tally("pns_worker_restarts", "Workers replaced", "cause", lambda: desk.restarts)
+        await service.catalogue()
 
 
 class _Layered(FastAPI):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from difflib import get_close_matches
 from http import HTTPStatus
@@ -102,11 +101,14 @@ def of_service_error(error: ServiceError) -> JSONResponse:
     return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
 
 
-def of_job_view(error: Exception, request_id: str | None) -> dict[str, Any]:
-    """Return the document as a part of a job; `request_id` is that of the request that made it."""
-    # The log has what it says of the job under that id.
-    answer = of_service_error(error) if isinstance(error, ServiceError) else internal_error()
-    return json.loads(bytes(answer.body)) | {"request_id": request_id}
+def of_job(error: ServiceError | JobFaultError) -> bytes:
+    """Return the document of a job that failed, logged as it would be outside of a stream."""
+    if isinstance(error, JobFaultError):
+        log.error("a job failed in its worker:\n%s", error)
+        return bytes(internal_error().body)
+    if error.status >= 500:
+        log.warning("%s: %s", error.code, error)
+    return bytes(of_service_error(error).body)
 
 
 def _of_validation_error(error: RequestValidationError) -> JSONResponse:
@@ -135,7 +137,7 @@ def _allowed(request: Request) -> list[str]:
     """Return the methods of all routes that share a path: the error knows those of one."""
     allowed = [
         method
-        for method in ("GET", "POST", "DELETE")
+        for method in ("GET", "POST")
         if any(
             route.matches({**request.scope, "method": method})[0] is Match.FULL
             for route in request.app.routes

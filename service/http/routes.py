@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import logging
-import time
-from contextlib import ExitStack
+import asyncio
+from contextlib import AsyncExitStack
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
@@ -14,19 +13,14 @@ from starlette.responses import Response
 from pns_common.scheme_names import BASE_SCHEMES
 
 from ..bodies import media
-from ..errors import NoModelError
+from ..errors import BusyError, NoModelError
 from ..settings import Settings
-from ..workers.catalogue import ModelEntry
-from ..workers.job import Job
-from . import documentation
-from .admission import DrainingError
-from .answer import FileAnswer, answer_type, is_known, server_timing, unless_gone
-from .clients import Client, client_of
-from .intake import Wanted, taken_in
+from ..workers.models import ModelEntry
+from . import openapi
+from .access.clients import Client, client_of
+from .answer import FileAnswer, StreamAnswer, answer_type, is_known, unless_gone
+from .jobs import Service
 from .parameters import Parameters
-from .service import Service
-
-log = logging.getLogger("pns.service")
 
 
 class Range(BaseModel):
@@ -46,10 +40,8 @@ class LimitsEntry(BaseModel):
     )
     levels: Range
     memory_bytes: int = Field(description="most memory predicted for one job")
-    seconds: float = Field(description="longest job, and longest wait for `POST /subdivide`")
-    queue_seconds: float = Field(description="longest wait of a job from `POST /jobs`")
-    result_seconds: float = Field(description="how long the result of a job is kept")
-    result_bytes: int = Field(description="what all results may take, and so each")
+    seconds: float = Field(description="longest job, and longest wait for a worker")
+    requests: int = Field(description="most requests that the client may have under way")
     formats: list[str] = Field(description="media types of bodies")
     schemes: list[str] = Field(description="base schemes that `scheme=` takes beside auto and pns")
 
@@ -63,9 +55,7 @@ def limits_of(settings: Settings, client: Client) -> LimitsEntry:
         levels=Range(min=1, max=settings.levels),
         memory_bytes=int(settings.memory),
         seconds=settings.job_seconds,
-        queue_seconds=settings.queue_seconds,
-        result_seconds=settings.result_seconds,
-        result_bytes=int(settings.result_bytes),
+        requests=settings.client_requests,
         formats=list(media.ACCEPTED),
         schemes=list(BASE_SCHEMES),
     )
@@ -75,37 +65,35 @@ def router(service: Service) -> APIRouter:
     """Make the routes, bound to one service."""
     routes = APIRouter()
 
-    @routes.post("/subdivide", response_class=Response, **documentation.SUBDIVIDE)
+    @routes.post("/subdivide", response_class=Response, **openapi.SUBDIVIDE)
     async def subdivide(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
         file_type = media.MEDIA_TYPES[parameters.format]
         return await _subdivide(service, request, parameters, answer_type(request, file_type))
 
-    @routes.post("/report", response_class=Response, **documentation.REPORT)
+    @routes.post("/report", response_class=Response, **openapi.REPORT)
     async def report(request: Request, parameters: Annotated[Parameters, Query()]) -> Response:
         return await _subdivide(service, request, parameters, media.JSON)
 
-    @routes.get("/models", response_model=list[ModelEntry], **documentation.MODELS)
+    @routes.get("/models", response_model=list[ModelEntry], **openapi.MODELS)
     async def models(request: Request) -> Response:
-        catalogue = await service.models.get()
+        catalogue = await service.catalogue()
         # It may change when the service starts again, so a copy is asked for, and costs nothing.
         headers = {"ETag": catalogue.tag, "Cache-Control": "no-cache"}
         if is_known(catalogue.tag, request):
             return Response(status_code=304, headers=headers)
         return Response(catalogue.content, headers=headers, media_type=media.JSON)
 
-    @routes.get("/limits", response_model=LimitsEntry, **documentation.LIMITS)
+    @routes.get("/limits", response_model=LimitsEntry, **openapi.LIMITS)
     async def limits(request: Request) -> LimitsEntry:
         return limits_of(service.settings, client_of(request, service.settings))
 
-    @routes.get("/healthz", **documentation.HEALTHZ)
+    @routes.get("/healthz", **openapi.HEALTHZ)
     async def healthz() -> dict[str, str]:
         return {"status": "ok"}
 
-    @routes.get("/readyz", **documentation.READYZ)
+    @routes.get("/readyz", **openapi.READYZ)
     async def readyz() -> dict[str, str]:
-        if service.admission.draining:
-            raise DrainingError("no new request is taken", retry_after=5)
-        if not service.desk.ready:
+        if not service.workers.ready:
             raise NoModelError("no worker has loaded the model")
         return {"status": "ready"}
 
@@ -115,34 +103,20 @@ def router(service: Service) -> APIRouter:
 async def _subdivide(
     service: Service, request: Request, parameters: Parameters, kind: str
 ) -> Response:
-    """Do a job that its client waits for."""
-    settings = service.settings
-    report_only = kind == media.JSON
-    wanted = Wanted(not report_only, report_only, folder=None, patience=settings.job_seconds)
-
-    with ExitStack() as held:
-        async with taken_in(service, request, parameters, wanted) as job:
-            (answer,) = job.results
-            held.enter_context(answer)
-            async with service.admission.working():
-                await unless_gone(request.receive, service.desk.serve(job))
-        timing = job.seconds | {"total": job.upload_seconds + time.monotonic() - job.admitted}
-        stages_text = server_timing(timing)
-        _log(job, answer.size, stages_text)
-        # From here on the file is the answer's.
-        held.pop_all()
-        return FileAnswer(
-            answer,
-            service.admission,
-            job.client,
-            stall_seconds=settings.stall_seconds,
-            media_type=kind,
-            headers={"Server-Timing": stages_text},
+    """Do a job that its client waits for, and where it is to be a stream tell how far it is."""
+    is_stream, is_report = kind == media.MIXED, kind == media.JSON
+    async with AsyncExitStack() as held:
+        taking = service.taken_in(
+            request, parameters, answer=not is_report, report=is_report or is_stream
         )
-
-
-def _log(job: Job, size: int, stages: str) -> None:
-    options = job.work.options
-    model = None if job.done is None else job.done.model
-    what = options.scheme if model is None else f"{options.scheme} ({model})"
-    log.info("%s levels=%d: %d bytes; %s", what, options.levels, size, stages)
+        job = await held.enter_async_context(taking)
+        if is_stream:
+            file_type = media.MEDIA_TYPES[parameters.format]
+            return StreamAnswer(service, job, held.pop_all(), file_type)
+        try:
+            await unless_gone(request.receive, service.serve(job))
+        except asyncio.CancelledError as error:
+            # Uvicorn's way to say that the time after SIGTERM is over.
+            raise BusyError("the service shuts down", retry_after=5) from error
+        file = job.report if is_report else job.answer
+        return FileAnswer(service, job, held.pop_all(), kind, file)

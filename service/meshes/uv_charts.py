@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.carry.charts import chart_points, refine_charts
 from pns_common.carry.columns import level_topologies
 from pns_common.mesh.creases import NO_CREASES, Creases
-from pns_common.mesh.rows import as_words, distinct_rows, number_by_first_appearance
-from pns_common.mesh.topology import EdgeClass, Topology, following
+from pns_common.mesh.topology import following
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import LOOP, BaseScheme
 
@@ -32,7 +32,9 @@ def uv_blend(options: Options, creases: Creases, base: BaseScheme = LOOP) -> UvB
 
     Pairs of triangles are quads to a base scheme of polygons.
     """
-    return partial(smooth_uv, creases=creases, base=base) if options.uv == "smooth" else linear_uv
+    if options.uv == "linear":
+        return linear_uv
+    return partial(smooth_uv, creases=creases, base=base, limit=options.limit)
 
 
 def linear_uv(
@@ -48,6 +50,8 @@ def smooth_uv(
     uv: Shaped[np.ndarray, "C 2"],
     creases: Creases,
     base: BaseScheme = LOOP,
+    *,
+    limit: bool = False,
 ) -> Float[np.ndarray, "N 2"]:
     """Blend by the base scheme's masks inside charts; see `refined_charts`."""
     grid, faces = connectivity.grid, connectivity.faces
@@ -58,7 +62,8 @@ def smooth_uv(
         faces = faces.reshape(-1, 6)[:, [0, 1, 2, 5]]
     flat, degree = faces.reshape(-1), faces.shape[1]
     offsets = np.arange(0, len(flat) + 1, degree)
-    columns, refined = refined_charts(uv[flat], vertex[flat], offsets, levels, creases, base)
+    asked = uv[flat], vertex[flat], offsets, levels, creases, base
+    columns, refined = refined_charts(*asked, limit=limit)
     descendants = refined.reshape(len(faces), -1)
     at_points = (
         at_quad_points(descendants, levels)
@@ -75,23 +80,18 @@ def refined_charts(
     levels: int,
     creases: Creases,
     base: BaseScheme = LOOP,
+    *,
+    limit: bool = False,
 ) -> tuple[Float[np.ndarray, "N 2"], Int[np.ndarray, "G K"]]:
-    """Refine values at the corners of faces by the masks inside charts; seams and rims stay linear.
+    """Refine values at the corners of faces, whose creases are named by their vertices.
 
-    A chart is a piece of the surface within which texture coordinates are continuous: corners are
-    one where vertex and coordinates are. Creases inside it are creases of its stencil too, at the
-    levels at which they are sharp, so that textures lie beside them as they lay. Returns the
-    refined values, and those of the corners of the refined faces.
+    Creases inside a chart are creases of its stencil too, at the levels at which they are sharp.
+    Return the refined values, and those of the corners of the refined faces.
     """
-    corner = distinct_rows(np.hstack([as_words(vertex[:, None]), as_words(uv)]))
-    flat, first = number_by_first_appearance(corner)
-    columns = uv[first].astype(np.float64)
-    sharp = _in_charts(creases, flat, offsets, vertex[first])
-    blocks = Blocks(available_threads())
-    topologies = level_topologies((flat, offsets), len(columns), levels, sharp, base, blocks)
-    for topology in topologies:
-        columns = _refined(columns, topology, blocks, base)
-    return columns, base.faces(topologies[-1], blocks, np.int64)
+    points, first = chart_points(vertex, uv)
+    sharp, blocks = _in_charts(creases, points, offsets, vertex[first]), Blocks(available_threads())
+    charts = level_topologies((points, offsets), len(first), levels, sharp, base, blocks)
+    return refine_charts(uv[first].astype(np.float64), charts, base, blocks, limit=limit)
 
 
 def _in_charts(
@@ -116,13 +116,3 @@ def _in_charts(
     order = np.lexsort((creases.sharpness, wanted))
     place = np.searchsorted(wanted[order], ends[kept], side="right") - 1
     return replace(creases, named=sides[kept], sharpness=creases.sharpness[order[place]])
-
-
-def _refined(
-    columns: Float[np.ndarray, "V 2"], topology: Topology, blocks: Blocks, base: BaseScheme
-) -> Float[np.ndarray, "W 2"]:
-    """Refine by the base scheme's masks; vertices on a boundary stay, as in linear blending."""
-    rim = (topology.edge_class != EdgeClass.INTERIOR) & (topology.edge_class != EdgeClass.CREASE)
-    at_rim, refined = topology.edges[rim].reshape(-1), base.place(columns, topology, blocks)
-    refined[at_rim] = columns[at_rim]
-    return refined

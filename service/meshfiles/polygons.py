@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Int
 
+from pns_common.carry import rules
+from pns_common.carry.carried import Column, in_type_of, refine_column
+from pns_common.carry.charts import chart_points, charts_of, refine_charts
 from pns_common.carry.columns import level_topologies
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh, fans
@@ -27,12 +30,9 @@ from pns_common.schemes import CATMULL_CLARK
 from ..advice import Bends, count_bends
 from ..course import Course
 from ..errors import UnrefinableError
-from ..gltf.refine.attributes import in_type_of
 from ..gltf.refine.changes import near_miss_changes, near_misses
 from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
 from ..gltf.refine.normals import safe_unit
-from ..gltf.refine.polygons import PolygonSplit
-from ..meshes.uv_charts import refined_charts
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Options
 from ..report import Change
@@ -117,7 +117,7 @@ def refine_polygons(
             progress=lambda done, total: course.reach(done / total),
         )
     with course.stage("attributes", 0.7, 1.0):
-        refined = _with_layers(mesh, control, creases, made, options)
+        refined = _with_layers(mesh, control, made, options)
     if traced:
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
@@ -195,16 +195,14 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
     return edges[hard]
 
 
-def _with_layers(
-    mesh: MeshFile, control: _Control, creases: Creases, made: Refinement, options: Options
-) -> MeshFile:
+def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners, selected = made.mesh.corners, made.selected
     counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
     of_face = np.repeat(control.faces, counts)
     layers: dict[str, Layer] = {}
     for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, creases, options)
+        layers[name] = _refined(name, layer, control, made, options)
     still = np.zeros(0, dtype=np.int64)
     if selected is not None:
         of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
@@ -263,29 +261,31 @@ def _with(
 
 
 def _refined(
-    name: str, layer: Layer, control: _Control, creases: Creases, options: Options
+    name: str, layer: Layer, control: _Control, made: Refinement, options: Options
 ) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
-    values, offsets = layer.values, control.mesh.offsets
-    bare = np.logical_or.reduceat(rows < 0, offsets[:-1])
+    values, mesh, blocks = layer.values, control.mesh, Blocks(available_threads())
+    bare = np.logical_or.reduceat(rows < 0, mesh.offsets[:-1])
     if name == UV and options.uv == "smooth":
-        asked = values[np.maximum(rows, 0)], control.mesh.corners, offsets, options.levels
-        column, corners = refined_charts(*asked, creases, CATMULL_CLARK)
+        points, first = chart_points(mesh.corners, values[np.maximum(rows, 0)])
+        charts = charts_of(points, made.topologies, CATMULL_CLARK, blocks)
+        column = values[np.maximum(rows[first], 0)].astype(np.float64)
+        column, corners = refine_charts(column, charts, CATMULL_CLARK, blocks, limit=options.limit)
+        column = in_type_of(values, column)
     else:
-        label = distinct_rows(np.stack([control.mesh.corners, rows], axis=1))
-        number, first = number_by_first_appearance(label)
-        column = values[np.maximum(rows[first], 0)]
-        whole, faces = column.dtype.kind != "f" and name != COLOUR, (number, offsets)
-        levels = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
-        for split in map(PolygonSplit, levels):
-            column = split.nearest(column) if whole else split.linear(column)
-        corners = PolygonSplit(levels[-1]).quads
+        label = distinct_rows(np.stack([mesh.corners, rows], axis=1))
+        points, first = number_by_first_appearance(label)
+        whole = values.dtype.kind != "f" and name != COLOUR
+        faces = points, mesh.offsets
+        charts = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
+        own = Column(values[np.maximum(rows[first], 0)], rules.nearest if whole else rules.linear)
+        column = refine_column(own, charts, CATMULL_CLARK)
+        corners = CATMULL_CLARK.faces(charts[-1], blocks, np.int64)
     corners = corners.reshape(-1)
     if bare.any():
-        counts = 4 * np.diff(offsets) * 4 ** (options.levels - 1)
+        counts = 4 * np.diff(mesh.offsets) * 4 ** (options.levels - 1)
         corners = np.where(np.repeat(bare, counts), NONE, corners)
-    column = column if column.dtype == values.dtype else in_type_of(values, column)
     return Layer(column, corners)
 
 

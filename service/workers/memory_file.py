@@ -5,9 +5,8 @@ pieces, parses nothing and pickles nothing, so no upload can hold its event loop
 killed in the middle leaves no half-read pipe behind. On Linux the file is memory (no disk, no tmpfs
 quota); elsewhere a temporary file.
 
-A path into `/proc` is a number that the kernel gives to the next file once this one is closed. So a
-file is closed only when nobody who knows its path may still open it: each of them holds it. And who
-opens it compares what was opened with what was meant.
+A path into `/proc` is a number that the kernel gives to the next file once this one is closed, and
+a worker may open it late. So who opens it compares what was opened with what was meant.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import os
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from ..errors import NoStorageError
 
@@ -37,64 +35,42 @@ class FileName:
 
 
 class MemoryFile:
-    """A file that others open by its `name`; gone once everybody who held it has let go.
-
-    Whoever makes it holds it, until the end of the `with` block. In a `folder` it lies on disk,
-    where it has no name either: nothing of it outlives the process.
+    """A file that others open by its `name`; gone at the end of the `with` block.
 
     Raises:
         NoStorageError: nothing can be written there.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self) -> None:
         try:
-            self._open(folder)
+            self._open()
         except OSError as error:
             raise NoStorageError(f"no file can be made: {error.strerror}") from error
 
-    def _open(self, folder: Path | None) -> None:
-        if not hasattr(os, "memfd_create"):
-            self._file = tempfile.NamedTemporaryFile(  # noqa: SIM115
-                prefix="pns-", buffering=0, dir=folder
-            )
-            path = self._file.name
-        else:
-            if folder is None:
-                self._file = os.fdopen(os.memfd_create("pns", os.MFD_CLOEXEC), "w+b", buffering=0)
-            else:
-                self._file = tempfile.TemporaryFile(buffering=0, dir=folder)  # noqa: SIM115
+    def _open(self) -> None:
+        if hasattr(os, "memfd_create"):
+            self._file = os.fdopen(os.memfd_create("pns", os.MFD_CLOEXEC), "w+b", buffering=0)
             path = f"/proc/{os.getpid()}/fd/{self._file.fileno()}"
+        else:
+            self._file = tempfile.NamedTemporaryFile(prefix="pns-", buffering=0)  # noqa: SIM115
+            path = self._file.name
         status = os.fstat(self._file.fileno())
         self.name = FileName(path, status.st_dev, status.st_ino)
-        self._holders = 1
 
     def __enter__(self) -> MemoryFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.release()
+        self.close()
 
-    def hold(self) -> None:
-        """Keep the file until one more `release`."""
-        if self._holders == 0:
-            raise ValueError("the file is closed")
-        self._holders += 1
-
-    def release(self) -> None:
-        """Let go; the last one gives the memory back."""
-        self._holders -= 1
-        if self._holders == 0:
-            self._file.close()
+    def close(self) -> None:
+        """Give the memory back, once the worker that has it open has closed it too."""
+        self._file.close()
 
     @property
     def descriptor(self) -> int:
         """The descriptor of this process."""
         return self._file.fileno()
-
-    @property
-    def closed(self) -> bool:
-        """True once all holders have let go."""
-        return self._holders == 0
 
     def append(self, data: bytes) -> None:
         """Write `data` at the end. Raises NoStorageError."""

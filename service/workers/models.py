@@ -1,15 +1,23 @@
-"""The models of a worker process: the one that is served, and the bundled ones."""
+"""The models of a worker process, and the catalogue of them for GET /models."""
 
 from __future__ import annotations
 
+import hashlib
+import logging
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, Field, TypeAdapter
 
 from ..errors import NoModelError, check_choice
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
+
+log = logging.getLogger("pns.service")
 
 
 class Models:
@@ -76,3 +84,85 @@ class Models:
             except (ModelError, ParameterError) as error:
                 raise NoModelError(str(error)) from error
         return self._loaded[source]
+
+
+class ModelEntry(BaseModel):
+    """A model: its file, and the card that is inside it."""
+
+    name: str = Field(description="what `model=` takes")
+    default: bool = Field(description="whether it is the one that runs without `model=`")
+    hash: str = Field(description="sha256 of the file, as in reports")
+    size: int | None = Field(description="the file's bytes; null for a model that has no file")
+    providers: list[str] | None = Field(
+        description="what onnxruntime runs it on, preferred first; null without a file"
+    )
+    format: int
+    features: str = Field(description="feature set of edges", examples=["paper-5"])
+    orientation: str = Field(examples=["symmetric"])
+    budget: float = Field(description="C that it was trained at, and the default of `budget`")
+    gate_sharpness: float = Field(description="c of the gate")
+    vertex_features: str | None = Field(
+        description="feature set of old vertices; null where Loop's rule places them"
+    )
+    vertex_gate_sharpness: float | None = Field(description="c of the old vertices' gate")
+    base: str | None = Field(description="base scheme; null in format 1, which has Loop")
+    prior_strength: float | None = Field(description="s of the prior; null in format 1")
+    boundary_strength: float | None = Field(
+        description="strength of the prior along boundaries and creases; null in format 1"
+    )
+    network_scale: float | None = Field(
+        description="τ, the longest vector of the network in edge lengths; null in format 1"
+    )
+    fold_angle: float | None = Field(
+        description="θ of the fold guard, in degrees; null in format 1"
+    )
+    sharpness_levels: int | None = Field(
+        description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
+    )
+    face_features: str | None = Field(
+        description="feature set of the vertices inside polygons; null where faces are triangles"
+    )
+    sharpness_features: str | None = Field(
+        description="feature set that says how sharp edges are; null where no network does"
+    )
+    training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
+    metrics: dict[str, Any] = Field(description="measured on held-out data")
+
+
+_ENTRIES = TypeAdapter(list[ModelEntry])
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """The models of a service: the `names` that may be asked for, and the JSON `content`."""
+
+    names: tuple[str, ...]
+    content: bytes
+
+    @cached_property
+    def tag(self) -> str:
+        """The ETag: same content, same tag."""
+        return f'"{hashlib.sha256(self.content).hexdigest()[:32]}"'
+
+
+def catalogue_of(models: Models) -> Catalogue:
+    """Read the catalogue, in a worker; a model that does not load has a name and no entry."""
+    sources, served = models.sources, models.served
+    entries: list[ModelEntry] = []
+    # A served file may be called like a bundled model; it is none of the names then.
+    for source in [*sources.values(), *([] if served in sources.values() else [served])]:
+        try:
+            model = models.load(source)
+        except NoModelError as error:
+            log.warning("%s", error)
+        else:
+            entries.append(_entry(model, default=source == served))
+    entries.sort(key=lambda entry: (entry.name, entry.default))
+    return Catalogue(tuple(sorted(sources)), _ENTRIES.dump_json(entries))
+
+
+def _entry(model: Model, *, default: bool) -> ModelEntry:
+    # A model that was given to the application need not come from a file.
+    size, providers = getattr(model, "size", None), getattr(model, "providers", None)
+    named = {"name": model.name, "hash": model.hash, "size": size, "providers": providers}
+    return ModelEntry(default=default, **named, **asdict(model.card))

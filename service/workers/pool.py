@@ -1,4 +1,9 @@
-"""Worker processes: jobs run where they can be killed and cannot hold the server's interpreter."""
+"""Worker processes and whose turn is next.
+
+Jobs run where they can be killed and cannot hold the server's interpreter. One rule is fair: a
+client holds at most all workers but one (the only one where there is one), until what it has left
+or broken is free again; of the others who came first is next.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +14,15 @@ import os
 import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
 from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
-from .memory_file import MemoryFile
-from .worker import no_interrupt
 
 T = TypeVar("T")
 
@@ -27,46 +31,58 @@ RESTART_SECONDS = 5.0
 # A warm-up imports and loads; with the extra `jit` it compiles, for minutes on a busy machine.
 WARM_UP_SECONDS = 600.0
 # How long a worker may take to end a job by itself, when it is asked to, before it is killed. A
-# fresh one takes as long to warm up: to kill it earlier would only let those who leave end workers
-# faster than they start, with bodies that take long to decode.
-GRACE_SECONDS = 2.0
-# How long a worker that has died may go unnoticed where nothing tells of it, and one that rests may
-# keep what its last job has freed.
+# fresh one takes longer to warm up.
+GRACE_SECONDS = 0.75
+# How long a worker that has died may go unnoticed where nothing reports it.
 WATCH_SECONDS = 1.0
 
 log = logging.getLogger("pns.service")
 
 
-class Workers:
-    """`count` worker processes, each with one job at a time.
+@dataclass(eq=False)
+class Turn:
+    """A client's place in the line for a worker; `began` is when it got one."""
 
-    Every process has a pebble pool of its own, so that a worker that dies or is killed breaks
-    nothing which another request waits on. A pool whose job did not come back is thrown away and
-    replaced. `warm_up` is called in each new process before it takes jobs.
+    client: str
+    pool: asyncio.Future[ProcessPool] = field(repr=False)
+    began: float | None = None
+
+
+class Workers:
+    """`count` worker processes, each with one job at a time of at most `seconds`.
+
+    Every process has a pebble pool of its own: a pool breaks with a process that dies idle, and
+    breaks nothing which another request waits on. A pool whose job did not come back is thrown away
+    and replaced. `warm_up` is called in each new process before it takes jobs.
     """
 
     def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
         self._count = count
         self._seconds = seconds
         self._warm_up = warm_up
-        self._free: asyncio.Queue[ProcessPool] = asyncio.Queue()
+        self._most = max(1, count - 1)
+        self._waiting: list[Turn] = []
+        self._free: list[ProcessPool] = []
         self._pools: set[ProcessPool] = set()
-        self._background: set[asyncio.Task[None]] = set()
         self._warm: set[ProcessPool] = set()
-        # Those that may hold what they have freed: for a next job at once, not while they rest.
-        self._used: set[ProcessPool] = set()
-        self._ends: set[asyncio.Task[None]] = set()
-        self._known: dict[ProcessPool, Sequence[MemoryFile]] = {}
+        self._holders: dict[ProcessPool, str] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._ends: dict[ProcessPool, asyncio.Task[None]] = {}
         self._stopping = False
+        self.held: Counter[str] = Counter()
+        """Number of workers by client, those that end its last job among them."""
         self.restarts: Counter[str] = Counter()
         """Number of replaced processes, by cause."""
-        self.warmed = False
-        """True once a worker has warmed up."""
 
     @property
     def ready(self) -> bool:
         """True while a worker that has warmed up is alive."""
         return any(pool.active for pool in self._warm)
+
+    @property
+    def waiting(self) -> int:
+        """Number of jobs that wait for a worker."""
+        return len(self._waiting)
 
     def start(self) -> None:
         """Start the processes; they warm up in the background."""
@@ -74,83 +90,54 @@ class Workers:
         # countless parts would stay for good. What glibc's has free it gives back page by page.
         os.environ.setdefault("PYTHONMALLOC", "malloc")
         for _ in range(self._count):
-            self._in_background(self._add())
+            self._in_background(self._add(""))
         self._in_background(self._watch())
 
     async def stop(self) -> None:
         """End every process, whatever it is doing."""
         self._stopping = True
-        for task in self._background:
+        for task in self._tasks:
             task.cancel()
-        await asyncio.gather(*self._background, return_exceptions=True)
-        for pool in tuple(self._pools):
-            self._end(pool)
-        await asyncio.gather(*self._ends)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*(self._end(pool) for pool in self._pools))
+
+    def join(self, client: str) -> Turn:
+        """Stand in line. `run` must follow."""
+        turn = Turn(client, asyncio.get_running_loop().create_future())
+        self._waiting.append(turn)
+        self._grant()
+        return turn
+
+    def place(self, turn: Turn | None) -> int:
+        """Count the jobs in front of one that waits."""
+        return self._waiting.index(turn) if turn in self._waiting else 0
 
     async def run(
         self,
+        turn: Turn,
         function: Callable[..., T],
         *arguments: object,
-        files: Sequence[MemoryFile] = (),
-        must_end: float | None = None,
-        stop: Callable[[], None] | None = None,
-        taken: Callable[[], None] = lambda: None,
+        stop: Callable[[], None] = lambda: None,
     ) -> T:
-        """Return the value of `function(*arguments)`, called in a worker once one is free.
+        """Return the value of `function(*arguments)`, called in a worker once it is its turn.
 
-        `taken` is called once a worker is free: before, another's may still be ending, or starting.
+        Cancelling this call ends the work: `stop` asks the job to end itself, and a worker that has
+        not come back shortly after is killed.
 
-        `files` are those that the arguments name: they are held until the function has come back
-        or its process is dead, whatever becomes of this call. It comes back before `must_end` (on
-        the clock of `time.monotonic`; None: within the seconds of a job), whether the worker says
-        anything or not.
-
-        Cancelling this call ends the work: `stop` is called to ask for it, and a worker that has
-        not come back shortly after is killed, at once where there is no `stop`.
-
-        Jobs have no side effects: one whose process ended is tried once more, in another.
-
-        Raises what the function raises (ServiceError as it is, anything else as
-        worker.JobFaultError), BusyError where no worker becomes free, JobTimeout past the deadline,
-        WorkerDied where the process ended twice.
+        Raises:
+            what the function raises (ServiceError as it is, anything else as worker.JobFaultError);
+            BusyError: no worker became free within the seconds of a job.
+            JobTimeout: it ran longer than these; its worker is killed.
+            WorkerDied: the process ended.
         """
-        if must_end is None:
-            must_end = time.monotonic() + self._seconds
-
-        async def attempt() -> T:
-            return await self._run_once(
-                function, *arguments, files=files, must_end=must_end, stop=stop, taken=taken
-            )
-
-        try:
-            return await attempt()
-        except WorkerDied as error:
-            log.warning("a job is tried again: %s", error)
-            return await attempt()
-
-    async def _run_once(
-        self,
-        function: Callable[..., T],
-        *arguments: object,
-        files: Sequence[MemoryFile],
-        must_end: float,
-        stop: Callable[[], None] | None,
-        taken: Callable[[], None],
-    ) -> T:
-        pool = await self._take(must_end)
-        taken()
-        for file in files:
-            file.hold()
-        self._known[pool] = files
+        pool = await self._come(turn)
+        turn.began = time.monotonic()
         try:
             future = _scheduled(pool, function, *arguments)
-            value = await _result(pool, future, must_end)
+            value = await _result(pool, future, self._seconds)
         except asyncio.CancelledError:
-            if stop is None:
-                self._replace(pool, "stopped")
-            else:
-                stop()
-                self._in_background(self._wind_down(pool, future))  # pyright: ignore[reportPossiblyUnboundVariable]
+            stop()
+            self._in_background(self._wind_down(pool, future))  # pyright: ignore[reportPossiblyUnboundVariable]
             raise
         except (JobTimeout, WorkerDied) as error:
             self._replace(pool, error.code)
@@ -161,124 +148,107 @@ class Workers:
         self._let_go(pool)
         return value
 
-    async def _take(self, must_end: float) -> ProcessPool:
-        """Take a free pool; those whose idle process has died meanwhile are replaced."""
+    async def _come(self, turn: Turn) -> ProcessPool:
         try:
-            async with asyncio.timeout(must_end - time.monotonic()):
-                while not (pool := await self._free.get()).active:
-                    self._replace(pool, "idle")
-                return pool
-        except TimeoutError as error:
-            raise BusyError("no worker became free in time") from error
+            async with asyncio.timeout(self._seconds):
+                return await turn.pool
+        except BaseException as error:
+            if turn in self._waiting:
+                self._waiting.remove(turn)
+            elif turn.pool.done() and not turn.pool.cancelled():
+                # Its turn came in the same moment.
+                self._let_go(turn.pool.result())
+            if isinstance(error, TimeoutError):
+                raise BusyError("no worker became free in time", retry_after=5) from error
+            raise
 
-    async def _watch(self) -> None:
-        """Look after those that are idle.
-
-        One that has died is replaced: with no request to find it, readiness would not return. One
-        that had a job gives back what that has freed, hundreds of megabytes perhaps.
-        """
-        while True:
-            await asyncio.sleep(WATCH_SECONDS)
-            for _ in range(self._free.qsize()):
-                pool = self._free.get_nowait()
-                if not pool.active:
-                    self._replace(pool, "idle")
-                elif pool in self._used:
-                    self._in_background(self._give_back(pool))
-                else:
-                    self._free.put_nowait(pool)
-
-    async def _give_back(self, pool: ProcessPool) -> None:
-        self._used.discard(pool)
-        try:
-            future = _scheduled(pool, worker.give_back)
-            await _result(pool, future, time.monotonic() + self._seconds)
-        except (JobTimeout, WorkerDied):
+    def _grant(self) -> None:
+        """Give every free worker that lives to the first in line whose client may hold one more."""
+        for pool in [pool for pool in self._free if not pool.active]:
+            self._free.remove(pool)
             self._replace(pool, "idle")
-            return
-        except Exception as error:
-            # It serves all the same.
-            log.warning("a worker keeps what its jobs have freed: %s", error)
-        self._free.put_nowait(pool)
-
-    async def _wind_down(self, pool: ProcessPool, future: asyncio.Future[T]) -> None:
-        """Give a job that nobody wants the time to end itself."""
-        try:
-            await asyncio.wait({future}, timeout=GRACE_SECONDS)
-        finally:
-            if future.done() and not _lost(future):
-                self._let_go(pool)
-            else:
-                self._replace(pool, "stopped")
-
-    async def _add(self) -> None:
-        """Start one more process, and put it among the free ones once it has warmed up."""
-        pool = ProcessPool(
-            max_workers=1,
-            initializer=worker.prepare,
-            # Spawn, not fork: the server has threads, and a fork of them may deadlock.
-            context=multiprocessing.get_context("spawn"),
-        )
-        self._pools.add(pool)
-        try:
-            future = _scheduled(pool, self._warm_up)
-            await _result(pool, future, time.monotonic() + WARM_UP_SECONDS)
-        except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
-            # What a disk had no room for, say, it may have soon.
-            log.warning("a worker did not start: %s", _reason(error))
-            await asyncio.sleep(RESTART_SECONDS)
-            self._replace(pool, "start")
-            return
-        except Exception as error:
-            # A model does not load, say: the process serves what needs none.
-            log.warning("a worker did not warm up: %s", error)
-        else:
-            self._warm.add(pool)
-            self.warmed = True
-        self._let_go(pool)
+        for turn in tuple(self._waiting):
+            if not self._free:
+                return
+            if self.held[turn.client] < self._most and not turn.pool.done():
+                self._waiting.remove(turn)
+                pool = self._free.pop(0)
+                self._holders[pool] = turn.client
+                self.held[turn.client] += 1
+                turn.pool.set_result(pool)
 
     def _let_go(self, pool: ProcessPool) -> None:
-        self._release(pool)
-        self._used.add(pool)
-        self._free.put_nowait(pool)
+        """Take back a worker."""
+        self._forgive(self._holders.pop(pool, ""))
+        self._free.append(pool)
+        self._grant()
 
-    def _release(self, pool: ProcessPool) -> None:
-        for file in self._known.pop(pool, ()):
-            file.release()
+    def _forgive(self, client: str) -> None:
+        self.held[client] -= 1
+        self.held += Counter()
+
+    async def _watch(self) -> None:
+        """Replace those that die while they are idle: with no request to find it, none would be."""
+        while True:
+            await asyncio.sleep(WATCH_SECONDS)
+            self._grant()
+
+    async def _wind_down(self, pool: ProcessPool, future: asyncio.Future[Any]) -> None:
+        """Give a job that nobody wants the time to end itself."""
+        await asyncio.wait({future}, timeout=GRACE_SECONDS)
+        if future.done() and not _lost(future):
+            self._let_go(pool)
+        else:
+            self._replace(pool, "stopped")
 
     def _replace(self, pool: ProcessPool, cause: str) -> None:
-        end = self._end(pool)
+        """End a process and start another, which its client holds until it is there."""
+        self._warm.discard(pool)
         if not self._stopping:
             self.restarts[cause] += 1
-            self._in_background(self._add_after(end))
+            self._in_background(self._add(self._holders.pop(pool, ""), pool))
 
-    async def _add_after(self, end: asyncio.Task[None]) -> None:
-        await asyncio.shield(end)
-        await self._add()
+    async def _add(self, holder: str, instead: ProcessPool | None = None) -> None:
+        """Start a process, and put it among the free ones once it has warmed up."""
+        while True:
+            if instead is not None:
+                await asyncio.shield(self._end(instead))
+                self._pools.discard(instead)
+                del self._ends[instead]
+            pool = ProcessPool(
+                max_workers=1,
+                initializer=worker.prepare,
+                # Spawn, not fork: the server has threads, and a fork of them may deadlock.
+                context=multiprocessing.get_context("spawn"),
+            )
+            self._pools.add(pool)
+            try:
+                await _result(pool, _scheduled(pool, self._warm_up), WARM_UP_SECONDS)
+                self._warm.add(pool)
+            except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
+                # What a disk had no room for, say, it may have soon.
+                log.warning("a worker did not start: %s", _reason(error))
+                self.restarts["start"] += 1
+                await asyncio.sleep(RESTART_SECONDS)
+                instead = pool
+                continue
+            except Exception as error:
+                # A model does not load, say: the process serves what needs none.
+                log.warning("a worker did not warm up: %s", error)
+            self._holders[pool] = holder
+            self._let_go(pool)
+            return
 
     def _end(self, pool: ProcessPool) -> asyncio.Task[None]:
-        """End a process, whoever waits for that, and then let go of the files that it knows."""
-
-        async def end() -> None:
-            try:
-                await asyncio.to_thread(_stop, pool)
-            except RuntimeError:
-                # No thread is left to wait in, and nothing else would start the next process.
-                _stop(pool)
-            self._release(pool)
-
-        self._pools.discard(pool)
-        self._warm.discard(pool)
-        self._used.discard(pool)
-        task = asyncio.get_running_loop().create_task(end())
-        self._ends.add(task)
-        task.add_done_callback(self._ends.discard)
-        return task
+        """End a process, once: pebble may hang where two threads do."""
+        if pool not in self._ends:
+            self._ends[pool] = asyncio.get_running_loop().create_task(_end(pool))
+        return self._ends[pool]
 
     def _in_background(self, work: Coroutine[object, object, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
-        self._background.add(task)
-        task.add_done_callback(self._background.discard)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
 
 def _scheduled(
@@ -287,7 +257,7 @@ def _scheduled(
     """Schedule what a process is to answer. Nothing ever cancels it: pebble would act on that."""
     try:
         # The first call starts the process.
-        with no_interrupt():
+        with worker.no_interrupt():
             future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
     except (RuntimeError, OSError) as error:
         # The process could not be started, or has died since the pool was looked at.
@@ -297,30 +267,26 @@ def _scheduled(
     return future
 
 
-async def _result(pool: ProcessPool, future: asyncio.Future[T], must_end: float) -> T:
-    silent = False
-    # The clock is ours: a process that is frozen does not even say that it has begun.
-    while not (future.done() or silent) and (left := must_end - time.monotonic()) > 0:
+async def _result(pool: ProcessPool, future: asyncio.Future[T], seconds: float) -> T:
+    # The clock is ours: pebble's begins with the worker's word that it has begun, and a process
+    # that is frozen says none.
+    end, silent = time.monotonic() + seconds, False
+    while not (future.done() or silent) and (left := end - time.monotonic()) > 0:
         # A pool may end without a word; what it tells of its end it tells soon after.
         silent = not pool.active
         await asyncio.wait({future}, timeout=min(left, WATCH_SECONDS))
     if not (future.done() or silent):
-        raise JobTimeout("the job took longer than a job may")
+        raise JobTimeout(f"the job took longer than {seconds:g} seconds")
     if not future.done() or _lost(future):
-        _log_end(future)
+        error = future.exception() if future.done() and not future.cancelled() else None
+        if isinstance(error, ProcessExpired) and error.exitcode is not None:
+            code = int(error.exitcode)
+            how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+            log.warning("worker process %s ended: %s", error.pid, how)
         raise WorkerDied(
             "the worker process ended before it answered; it may have run out of memory"
         )
     return future.result()
-
-
-def _log_end(future: asyncio.Future[T]) -> None:
-    """Log which process ended, and how, where its pool has told it."""
-    error = future.exception() if future.done() and not future.cancelled() else None
-    if isinstance(error, ProcessExpired) and error.exitcode is not None:
-        code = int(error.exitcode)
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        log.warning("worker process %s ended: %s", error.pid, how)
 
 
 def _reason(error: BaseException) -> BaseException:
@@ -328,11 +294,20 @@ def _reason(error: BaseException) -> BaseException:
     return error if error.__cause__ is None else _reason(error.__cause__)
 
 
-def _lost(future: asyncio.Future[T]) -> bool:
+def _lost(future: asyncio.Future[Any]) -> bool:
     """Return whether the process ended instead of answering."""
     return future.cancelled() or isinstance(future.exception(), (ProcessExpired, BrokenProcessPool))
 
 
-def _stop(pool: ProcessPool) -> None:
-    pool.stop()
-    pool.join()
+async def _end(pool: ProcessPool) -> None:
+    """End a process; SIGTERM at once, SIGKILL where that does not do."""
+
+    def end() -> None:
+        pool.stop()
+        pool.join()
+
+    try:
+        await asyncio.to_thread(end)
+    except RuntimeError:
+        # No thread is left to wait in, and nothing else would start the next process.
+        end()

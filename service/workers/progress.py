@@ -60,7 +60,7 @@ class ProgressPage:
             self._words.release()
             self._words = None
             self._map.close()
-            self.file.release()
+            self.file.close()
 
     @property
     def stage(self) -> str | None:
@@ -81,11 +81,6 @@ class ProgressPage:
         """Ask the worker to end the job where it next looks."""
         if self._words is not None:
             self._words[_STOP] = 1
-
-    def go_on(self) -> None:
-        """Let the job begin again, once it has stopped."""
-        if self._words is not None:
-            self._words[_STOP] = self._words[_DONE] = 0
 
 
 class Reporter:

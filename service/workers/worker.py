@@ -80,6 +80,8 @@ def call(function: Callable[..., T], *arguments: object) -> T:
         text = "".join(traceback.format_exception(error))
         _let_go(error)
         raise JobFaultError(text) from None
+    finally:
+        give_back()
 
 
 def _let_go(error: BaseException | None) -> None:

@@ -1,6 +1,8 @@
 """Compose and Kubernetes: valid, restricted, and in step with the service."""
 
+import configparser
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -12,12 +14,7 @@ from threading import Thread
 
 import pytest
 
-from service.http.app import create_app
-from service.http.room import KEPT_SHARE
-from service.http.watch.metrics import scrapes
 from service.settings import Settings
-from tests.support import stand_in_jobs as jobs
-from tests.support.live import local
 
 yaml = pytest.importorskip("yaml")
 
@@ -31,13 +28,8 @@ POD = BY_KIND["Deployment"]["spec"]["template"]["spec"]
 PROXY, CONTAINER = POD["containers"]
 
 
-@pytest.mark.parametrize("name", ["pns.yaml", "replicas.yaml"])
-def test_the_manifests_are_valid(name, tmp_path):
-    # Those of operators have schemas of their own.
-    kept = list(yaml.safe_load_all((DEPLOY / "kubernetes" / name).read_text()))
-    kept = [entry for entry in kept if entry["kind"] != "ServiceMonitor"]
-    file = tmp_path / name
-    file.write_text(yaml.safe_dump_all(kept))
+def test_the_manifests_are_valid():
+    file = DEPLOY / "kubernetes" / "pns.yaml"
     tool = ROOT / ".venv-clients" / "bin" / "kubernetes-validate"
     program = str(tool) if tool.exists() else shutil.which("kubernetes-validate")
     if program is None:
@@ -224,19 +216,15 @@ def test_what_lies_in_a_file_system_of_memory_leaves_room_for_the_process(name):
 def test_what_requests_may_hold_fits_into_the_memory_that_there_is(where):
     """The server's bodies, answers and files are not given back where a worker is killed."""
     image = dict(re.findall(r"^ +PNS_([A-Z_]+)=(\S+)", DOCKERFILE, re.MULTILINE))
-    service = COMPOSE["services"]["service"]
-    (mounted,) = service["tmpfs"]
-    environment, files, limit, jobs = {
-        "image": ({}, 0, 1024, 1),
+    environment, limit, jobs = {
+        "image": ({}, 1024, 1),
         "compose": (
-            service["environment"],
-            mebibytes(mounted.partition("size=")[2].partition(",")[0]),
-            mebibytes(service["mem_limit"]),
+            COMPOSE["services"]["service"]["environment"],
+            mebibytes(COMPOSE["services"]["service"]["mem_limit"]),
             None,
         ),
         "kubernetes": (
             {entry["name"]: entry["value"] for entry in CONTAINER["env"]},
-            0,
             mebibytes(CONTAINER["resources"]["limits"]["memory"].lower().removesuffix("i")),
             None,
         ),
@@ -246,90 +234,55 @@ def test_what_requests_may_hold_fits_into_the_memory_that_there_is(where):
     of_worker, of_server = map(
         int, re.findall(r"take (\d+) MiB each and the server (\d+)", DOCKERFILE)[0]
     )
-    held = (settings.all_bodies + settings.answer_bytes) / 2**20 + files
+    # A body for each place, and what answers and made files take besides.
+    held = (settings.workers + settings.queue) * settings.body / 2**20
     working = (jobs or settings.workers) * settings.memory / 2**20
-    assert (settings.workers + 1) * of_worker + of_server + held + working <= limit
-    # With what is made meanwhile, as the service would say at its start.
-    assert not files or settings.result_bytes <= files * KEPT_SHARE * 2**20
+    assert settings.workers * of_worker + of_server + held + working <= limit
+
+
+def test_the_proxys_room_holds_all_bodies_that_it_lets_in():
+    configuration = (DEPLOY / "proxy" / "nginx.conf").read_text()
+    (most,) = re.findall(r"limit_conn all_bodies (\d+);", configuration)
+    (mounted,) = COMPOSE["services"]["proxy"]["tmpfs"]
+    volumes = {volume["name"]: volume for volume in POD["volumes"]}
+    for room in (
+        mounted.partition("size=")[2].partition(",")[0],
+        volumes["proxy-tmp"]["emptyDir"]["sizeLimit"].lower().removesuffix("i"),
+    ):
+        assert int(most) * Settings().body / 2**20 <= mebibytes(room)
+
+
+def test_one_replica_at_a_time_goes():
+    labels = BY_KIND["Deployment"]["spec"]["selector"]
+    assert BY_KIND["PodDisruptionBudget"]["spec"] == {"maxUnavailable": 1, "selector": labels}
+    assert BY_KIND["Deployment"]["spec"]["replicas"] > 1
+
+
+def test_the_unit_starts(tmp_path):
+    """Its command runs in its environment until the service answers."""
+    unit = configparser.ConfigParser(strict=False, interpolation=None)
+    unit.optionxform = str
+    text = (DEPLOY / "systemd" / "pns.service").read_text()
+    unit.read_string(text)
+    assert unit["Service"]["ExecStart"] == "/opt/pns/bin/pns serve"
+    assert int(unit["Service"]["TimeoutStopSec"]) >= Settings().drain_seconds
+    given = [
+        pair for line in re.findall(r"^Environment=(.*)$", text, re.M) for pair in line.split()
+    ]
+    environment = dict(pair.split("=", 1) for pair in given)
+    own = {
+        name.removeprefix("PNS_").lower(): v for name, v in environment.items() if "PNS_" in name
+    }
+    assert Settings(**own).port == 8000
+    environment |= {"PNS_PORT": "0", "PNS_METRICS_PORT": "0"}
+    command = [Path(sys.executable).with_name("pns"), "serve"]
+    with subprocess.Popen(
+        command, env=os.environ | environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert "Open http://127.0.0.1:" in process.stdout.readline()
+        process.terminate()
+        assert process.wait(60) == 0
 
 
 def mebibytes(size):
     return int(size[:-1]) * {"m": 1, "g": 1024}[size[-1]]
-
-
-REPLICAS = list(yaml.safe_load_all((DEPLOY / "kubernetes" / "replicas.yaml").read_text()))
-
-
-def of_kind(kind, name):
-    (found,) = (
-        entry for entry in REPLICAS if (entry["kind"], entry["metadata"]["name"]) == (kind, name)
-    )
-    return found["spec"]
-
-
-def test_replicas_are_scaled_by_a_metric_that_the_service_has():
-    scaler = of_kind("HorizontalPodAutoscaler", "pns")
-    assert scaler["scaleTargetRef"]["name"] == BY_KIND["Deployment"]["metadata"]["name"]
-    assert scaler["minReplicas"] > 1
-    (metric,) = scaler["metrics"]
-    app = create_app(Settings(workers=1), warm_up=jobs.no_warm_up)
-    text = local(scrapes(app.state.metrics.registry)).get("/metrics").text
-    assert f"\n{metric['pods']['metric']['name']} " in text
-
-
-def test_one_replica_at_a_time_goes_and_all_are_watched():
-    labels = BY_KIND["Deployment"]["spec"]["selector"]
-    assert of_kind("PodDisruptionBudget", "pns") == {"maxUnavailable": 1, "selector": labels}
-    (endpoint,) = of_kind("ServiceMonitor", "pns")["endpoints"]
-    (port,) = of_kind("Service", "pns-metrics")["ports"]
-    assert endpoint["port"] == port["name"]
-    assert port["targetPort"] in {port["name"] for port in CONTAINER["ports"]}
-
-
-def test_the_store_is_the_services_alone_and_throws_nothing_away():
-    policy = of_kind("NetworkPolicy", "pns-store")
-    (rule,) = policy["ingress"]
-    assert rule["from"] == [{"podSelector": BY_KIND["Deployment"]["spec"]["selector"]}]
-    assert "egress" not in policy
-    (store,) = of_kind("Deployment", "pns-store")["template"]["spec"]["containers"]
-    arguments = " ".join(store["args"])
-    assert "--maxmemory-policy noeviction" in arguments
-
-
-@pytest.mark.parametrize("where", ["compose", "kubernetes"])
-def test_the_store_has_room_for_what_all_replicas_put_there(where):
-    """docs/howto/replicas.md has the sum; a replica of another release may run beside them."""
-    image = dict(re.findall(r"^ +PNS_([A-Z_]+)=(\S+)", DOCKERFILE, re.MULTILINE))
-    if where == "compose":
-        services = yaml.safe_load((DEPLOY / "compose.replicas.yaml").read_text())["services"]
-        replicas, environment = 2, services["second"]["environment"]
-        command, limit = services["store"]["command"], mebibytes(services["store"]["mem_limit"])
-    else:
-        text = (DEPLOY / "kubernetes" / "replicas.yaml").read_text()
-        environment = {entry["name"]: entry["value"] for entry in CONTAINER["env"]}
-        environment |= dict(re.findall(r"(PNS_[A-Z_]+)=(\S+)", text))
-        most = of_kind("HorizontalPodAutoscaler", "pns")["maxReplicas"]
-        # What a rollout adds: a quarter.
-        replicas = most + -(-most // 4)
-        (store,) = of_kind("Deployment", "pns-store")["template"]["spec"]["containers"]
-        command = store["args"]
-        limit = mebibytes(store["resources"]["limits"]["memory"].lower().removesuffix("i"))
-    own = {name.removeprefix("PNS_"): value for name, value in environment.items()}
-    settings = Settings(**{name.lower(): value for name, value in (image | own).items()})
-    size = mebibytes(command[command.index("--maxmemory") + 1].removesuffix("b"))
-    held = (settings.result_bytes + replicas * settings.all_bodies) / 2**20
-    assert held + 64 <= size
-    assert size * 3 / 2 <= limit
-
-
-def test_both_replicas_of_compose_share_one_store_and_one_name():
-    services = yaml.safe_load((DEPLOY / "compose.replicas.yaml").read_text())["services"]
-    stores = {services[name]["environment"]["PNS_STORE"] for name in ("service", "second")}
-    assert stores == {"redis://store:6379/0"}
-    assert Settings(store=stores.pop()).store
-    assert "service" in services["second"]["networks"]["inside"]["aliases"]
-    network = ip_network(COMPOSE["networks"]["inside"]["ipam"]["config"][0]["subnet"])
-    inside = [entry["networks"]["inside"]["ipv4_address"] for entry in services.values()]
-    inside.append(COMPOSE["services"]["proxy"]["networks"]["inside"]["ipv4_address"])
-    assert len(set(inside)) == 4
-    assert all(ip_address(address) in network for address in inside)

@@ -10,7 +10,6 @@ from contextlib import ExitStack, closing, suppress
 
 import pytest
 
-from service.http.room import BEYOND
 from tests.support.live import served
 from tests.support.proxy import free_port, proxied
 
@@ -114,50 +113,6 @@ def test_a_body_that_stops_is_the_proxys_to_end(proxy):
             assert b"200 OK" not in b"".join(iter(lambda: connection.recv(4096), b""))
 
 
-def test_neither_bodies_nor_answers_are_collected_at_the_proxy(proxy):
-    """Its room would be everybody's: one client could fill it."""
-    address, lines, _ = proxy
-    del lines[:]
-    half = 2**20
-    with socket.create_connection(address, timeout=600) as sender:
-        sender.sendall(
-            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
-            b"X-Request-ID: half\r\nContent-Length: %d\r\n\r\n" % (2 * half) + bytes(half)
-        )
-        with suppress(ConnectionResetError):
-            b"".join(iter(lambda: sender.recv(4096), b""))
-    # What came of it has gone on to the service, which sees its end a moment after its client.
-    pause, told = threading.Event(), []
-    while not told:
-        pause.wait(0.1)
-        told = [line for line in heard(address, lines) if line["request_id"] == "half"]
-    assert [line["received"] > 0 for line in told] == [True]
-
-    body = f"large {32 * half}".encode()
-    with socket.socket() as reader:
-        reader.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        reader.connect(address)
-        reader.sendall(
-            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
-            b"Content-Length: %d\r\n\r\n" % len(body) + body
-        )
-        assert reader.recv(12) == b"HTTP/1.1 200"
-        del lines[:]
-        # The service still has most of it, however long the proxy could have taken it.
-        for _ in range(20):
-            assert "/subdivide" not in [line["route"] for line in heard(address, lines)]
-
-
-def test_a_site_of_ipv6_has_so_many_connections_whatever_its_subscribers(proxy):
-    """A /56 may be one subscriber's, and a /48 one site's."""
-    address, _, _ = proxy
-    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
-    clients = [f"2001:db8:0:{network:x}::1" for network in range(160)]
-    assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
-    answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:1::1"})
-    assert answer.status == 200
-
-
 @pytest.mark.parametrize("query", ["levels=9", "model=none", "levels=1"])
 def test_an_answer_before_the_body_is_whole_reaches_its_client(proxy, query):
     kind = "none/none" if query == "levels=1" else "model/gltf-binary"
@@ -204,15 +159,6 @@ def test_a_subscribers_ipv6_addresses_are_one(proxy):
     assert answer.status == 200
 
 
-def test_who_is_refused_while_sending_is_told_why(tmp_path, monkeypatch):
-    """A service that ended the connection would reset it, and the proxy's answer be a 502."""
-    monkeypatch.setattr("service.http.app.connections_that_fit", lambda settings: -BEYOND)
-    with served(workers=1, proxies="127.0.0.1") as behind, proxied(behind, tmp_path) as address:
-        refused = [ask(address, "POST", "/subdivide", bytes(4_000_000), GLB) for _ in range(20)]
-    for answer, text in refused:
-        assert (answer.status, json.loads(text)["code"]) == (503, "busy")
-
-
 def test_without_a_service_the_proxy_says_so(tmp_path):
     with proxied(("127.0.0.1", free_port()), tmp_path) as address:
         answer, text = ask(address, "GET", "/limits", headers={"X-Request-ID": "mine"})
@@ -234,3 +180,60 @@ def test_the_proxys_logs_say_nothing_of_paths(proxy):
     for said in (log, (folder / "error.log").read_text()):
         assert "secret" not in said
         assert "nothing" not in said
+
+
+def test_a_request_of_http_1_0_may_name_no_host(proxy):
+    with socket.create_connection(proxy[0], timeout=600) as connection:
+        connection.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
+        said = b"".join(iter(lambda: connection.recv(4096), b""))
+    assert said.startswith(b"HTTP/1.1 200 ")
+
+
+def test_a_body_in_countless_pieces_comes_to_the_service_in_one(proxy):
+    """Its parser of HTTP would be busy with them for seconds."""
+    with socket.create_connection(proxy[0], timeout=600) as connection:
+        connection.sendall(
+            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"Connection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
+            + b"1\r\nx\r\n" * 50_000
+            + b"0\r\n\r\n"
+        )
+        said = b"".join(iter(lambda: connection.recv(2**16), b""))
+    assert said.endswith(b"x" * 50_000)
+
+
+def test_half_a_body_never_reaches_the_service(proxy):
+    address, lines, _ = proxy
+    del lines[:]
+    with socket.create_connection(address, timeout=600) as sender:
+        sender.sendall(
+            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"Content-Length: 2000000\r\n\r\n" + bytes(10**6)
+        )
+    assert "/subdivide" not in [line["route"] for line in heard(address, lines)]
+
+
+def test_a_stream_passes_as_it_comes(proxy, tmp_path):
+    headers = GLB | {"Accept": "multipart/mixed"}
+    with closing(http.client.HTTPConnection(*proxy[0], timeout=600)) as connection:
+        connection.request("POST", "/subdivide", f"steps {tmp_path}", headers)
+        answer = connection.getresponse()
+        assert "X-Accel-Buffering" not in answer.headers
+        said = b""
+        for number in (1, 2, 3):
+            while b'"share":%.2f' % (number / 4) not in said.replace(b"0.5}", b"0.50}"):
+                said += answer.read1()
+            (tmp_path / f"go-{number}").touch()
+        assert answer.read().endswith(b"--\r\n")
+
+
+def test_where_a_replica_dies_the_other_serves(tmp_path):
+    with (
+        served(workers=1, proxies="127.0.0.1") as first,
+        ExitStack() as second,
+        proxied(first, tmp_path, second.enter_context(served(workers=1))) as address,
+    ):
+        assert ask(address, "POST", "/subdivide", b"echo", GLB)[0].status == 200
+        second.close()
+        for _ in range(6):
+            assert ask(address, "POST", "/subdivide", b"echo", GLB)[0].status == 200

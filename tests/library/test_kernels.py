@@ -31,7 +31,7 @@ def test_this_checkout_runs_what_was_compiled_of_its_sources():
 
 
 def test_numba_gives_the_same_bits():
-    by_jit = {**os.environ, "PNS_JIT": "1"}
+    by_jit = {**os.environ, "KERNELS_JIT": "1"}
     said = [
         subprocess.run(
             [sys.executable, "-c", DIGEST], env=env, capture_output=True, text=True, check=True

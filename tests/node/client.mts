@@ -40,18 +40,6 @@ const problem: components["schemas"]["Problem"] | undefined = refused.error;
 
 const limits = await client.GET("/limits");
 const models = await client.GET("/models");
-const job = await client.POST("/jobs", {
-  params: { query: { scheme: "loop" } },
-  body: asForm,
-  bodySerializer: form,
-});
-if (job.error) throw new Error(job.error.detail);
-let seen: components["schemas"]["Job"] = job.data;
-while (seen.state === "queued" || seen.state === "running") {
-  const found = await client.GET("/jobs/{job_id}", { params: { path: { job_id: seen.id } } });
-  if (found.error) throw new Error(found.error.detail);
-  seen = found.data;
-}
 
 console.log(
   JSON.stringify({
@@ -59,6 +47,5 @@ console.log(
     problem: problem?.code,
     body_bytes: limits.data?.body_bytes,
     models: models.data?.map((model) => model.name),
-    job: seen.state,
   }),
 );

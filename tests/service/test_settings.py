@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from service.options import Limits
 from service.settings import Settings
 
 EXAMPLES = {
@@ -23,7 +24,7 @@ EXAMPLES = {
     "json_items": ("500", 500),
     "workers": ("3", 3),
     "queue": ("0", 0),
-    "uploads": ("7", 7),
+    "client_requests": ("3", 3),
     "job_seconds": ("7.5", 7.5),
     "connections": ("100", 100),
     "proxies": ("10.0.0.0/8, 192.0.2.1", (ip_network("10.0.0.0/8"), ip_network("192.0.2.1"))),
@@ -39,26 +40,12 @@ EXAMPLES = {
     "hosts": ("pns.example, *.A.example", ("pns.example", "*.a.example")),
     "metrics_host": ("0.0.0.0", "0.0.0.0"),
     "metrics_port": ("9000", 9000),
-    "head_seconds": ("3", 3),
     "keep_alive_seconds": ("4", 4),
-    "grace_seconds": ("6", 6),
-    "rate": ("1KiB", 1024),
     "upload_seconds": ("20", 20),
     "idle_seconds": ("2.5", 2.5),
     "stall_seconds": ("5", 5),
     "drain_seconds": ("9", 9),
-    "queue_seconds": ("90", 90),
-    "short_seconds": ("0.2", 0.2),
     "faces_per_minute": ("1000", 1000),
-    "promised_seconds": ("30", 30),
-    "result_seconds": ("60", 60),
-    "result_bytes": ("1MiB", 2**20),
-    "results": ("3", 3),
-    "result_folder": ("/var/tmp", Path("/var/tmp")),
-    "store": ("redis://localhost:6379/0", "redis://localhost:6379/0"),
-    "store_files": ("s3://bucket/folder", "s3://bucket/folder"),
-    "answer_bytes": ("2MiB", 2 * 2**20),
-    "upload_bytes": ("100MiB", 100 * 2**20),
 }
 
 
@@ -83,15 +70,10 @@ def test_the_documented_limits_are_the_defaults() -> None:
     assert settings.port == 8000
 
 
-def test_bodies_may_take_one_for_each_job_or_what_is_set() -> None:
-    assert Settings(body=10, workers=2, queue=3).all_bodies == 50
-    assert Settings(body=10, workers=1, queue=0).all_bodies == 20
-    assert Settings(body=10, workers=2, queue=3, upload_bytes=14).all_bodies == 14
-
-
 def test_job_limits_are_the_settings() -> None:
     limits = Settings(faces=10, memory=20, json_items=30).job_limits()
     assert (limits.max_faces, limits.max_memory_bytes, limits.max_json_items) == (10, 20, 30)
+    assert Settings().job_limits() == Limits()
 
 
 @pytest.mark.parametrize(
@@ -107,20 +89,14 @@ def test_job_limits_are_the_settings() -> None:
         ("json_items", 0),
         ("workers", 0),
         ("queue", -1),
-        ("uploads", 0),
-        ("upload_bytes", 0),
         # Of which one client may have three quarters: its largest body would never come.
-        ("upload_bytes", 64 * 2**20),
         ("idle_seconds", 0),
         ("job_seconds", 0),
         ("upload_seconds", -1),
         ("stall_seconds", 0),
         ("drain_seconds", 0),
-        ("head_seconds", 0),
         ("keep_alive_seconds", 0),
         ("answer_seconds", 0),
-        ("grace_seconds", 0),
-        ("rate", 0),
         ("connections", 0),
         ("proxies", "10.0.0.1/8"),
         ("proxies", "localhost"),
@@ -133,11 +109,9 @@ def test_job_limits_are_the_settings() -> None:
         ("metrics_host", ""),
         ("model", ""),
         ("keys_file", ""),
-        ("result_folder", ""),
         # Of which a beginning reads.
         ("body", "1,5GiB"),
         ("body", "1e-3"),
-        ("rate", "8KiB/s"),
         # More than the kernel counts.
         ("memory", "16EiB"),
         ("bodies", 1),

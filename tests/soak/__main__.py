@@ -5,8 +5,7 @@ python -m tests.soak --minutes 1440
 python -m tests.soak --address 127.0.0.1:8000 --one-source   # one that runs, a container's say
 
 A service of its own stands behind the proxy of deploy/ where there is nginx. From one source the
-attackers share the honest clients' slots. Results that it keeps hold descriptors at the end
-(PNS_RESULT_SECONDS=5).
+attackers share the honest clients' slots.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.synchronize import Event
 
-from tests.soak.job_attacks import come_and_go, deletes, followers, leavers
 from tests.soak.target import PATIENCE, Target, head, hold_anew, side_by_side
 
 CHUNKED = "Transfer-Encoding: chunked\r\n"
@@ -101,7 +100,7 @@ def nonsense(target: Target, ended: Event) -> None:
         head("POST", "/subdivide", CHUNKED) + b"zz\r\n",
         b"GET /\x1b[31m HTTP/1.1\r\nHost: localhost\r\nX-Forwarded-For: 1.1.1.1\r\n\r\n",
         b"GET /" + b"a" * 2**17,
-        head("POST", "/jobs/../../etc/passwd") + b"",
+        head("POST", "/assets/../../etc/passwd"),
     ]
 
     def connect(number: int) -> None:
@@ -148,6 +147,48 @@ def _many_nodes(count: int) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
 
 
+def whiskers(target: Target, ended: Event) -> None:
+    """Polygons with a whisker of 16,000 corners and no width, which take long to cut badly."""
+    count = 8_000
+    there = [(8 + n, 0) for n in range(count)]
+    outline = [(0, 0), (4, 1), (8, 0), *there, *reversed(there), (8, 8), (0, 8)]
+    text = "".join(f"v {x} {y} 0\n" for x, y in outline)
+    body = (text + "f " + " ".join(map(str, range(1, len(outline) + 1)))).encode()
+
+    def connect(number: int) -> None:
+        asks = head("POST", "/subdivide?polygons=off", f"Content-Length: {len(body)}\r\n")
+        asks = asks.replace(b"model/gltf-binary", b"model/obj")
+        while not ended.wait(0.1):
+            with suppress(OSError), target.connected(number) as opened:
+                opened.settimeout(PATIENCE)
+                opened.sendall(asks + body)
+                opened.recv(2**16)
+
+    side_by_side(connect, 6)
+
+
+def left_streams(target: Target, ended: Event) -> None:
+    """Streams that are left once they have begun, and others of which nothing is read."""
+    body = _deep()
+
+    def connect(number: int) -> None:
+        more = f"Accept: multipart/mixed\r\nContent-Length: {len(body)}\r\n"
+        while not ended.is_set():
+            with suppress(OSError), target.connected(number) as opened:
+                opened.settimeout(PATIENCE)
+                opened.sendall(head("POST", "/subdivide?levels=5", more) + body)
+                opened.recv(256)
+                ended.wait(0.2 if number % 2 else 15)
+
+    side_by_side(connect, 12)
+
+
+def _deep() -> bytes:
+    from service.meshfiles.example import part_glb
+
+    return part_glb()
+
+
 ATTACKS: dict[str, Attack] = {
     "one-byte chunks": crumbs,
     "trickling uploads": trickles,
@@ -158,8 +199,6 @@ ATTACKS: dict[str, Attack] = {
     "pipelines": pipelines,
     "nonsense": nonsense,
     "bombs": bombs,
-    "followers": followers,
-    "jobs that come and go": come_and_go,
-    "results that are left": leavers,
-    "deletes": deletes,
+    "whiskers": whiskers,
+    "streams that are left": left_streams,
 }

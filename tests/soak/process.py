@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +19,8 @@ from tests.support.proxy import proxied
 
 ROOT = Path(__file__).resolve().parents[2]
 PROPORTIONAL = re.compile(r"^Pss_(?:Anon|Shmem): +(\d+) kB$", re.MULTILINE)
-# Results are not kept for a quarter of an hour: they would still be there at the end.
-SETTINGS = {"PNS_WORKERS": "2", "PNS_RESULT_SECONDS": "5", "PNS_PROXIES": "127.0.0.1"}
 # The honest clients have one address together.
+SETTINGS = {"PNS_WORKERS": "2", "PNS_CLIENT_REQUESTS": "8", "PNS_PROXIES": "127.0.0.1"}
 HONEST_RATE = 200
 RUNNING = re.compile(r"running on http://([\d.]+):(\d+)")
 
@@ -37,26 +36,35 @@ class Held:
 
 @contextmanager
 def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
-    """A server behind the proxy of deploy/, or alone where there is no nginx.
+    """Two replicas behind the proxy of deploy/, or one alone where there is no nginx.
 
-    Yields the address that clients ask, and the server's process id; its lines go to `log`, the
-    proxy's to access.log beside it.
+    Yields the address that clients ask, and the first replica's process id; lines of both go to
+    `log`, the proxy's to access.log beside it.
     """
+    with ExitStack() as stack:
+        first, pid = stack.enter_context(_replica(log))
+        if shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin"):
+            second, _ = stack.enter_context(_replica(log))
+            options = {"seconds": 10, "rate": HONEST_RATE}
+            front = stack.enter_context(proxied(first, log.parent, second, **options))
+            yield front, pid
+        else:
+            yield first, pid
+
+
+@contextmanager
+def _replica(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
     command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
-    with log.open("w") as lines:
+    with log.open("a") as lines:
+        before = log.stat().st_size
         process = subprocess.Popen(command, cwd=ROOT, stderr=lines, env=os.environ | SETTINGS)
     try:
         pause = threading.Event()
-        while not (told := RUNNING.search(log.read_text())):
+        while not (told := RUNNING.search(log.read_text()[before:])):
             if process.poll() is not None:
                 raise RuntimeError(log.read_text()[-2000:])
             pause.wait(0.1)
-        address = told[1], int(told[2])
-        if shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin"):
-            with proxied(address, log.parent, seconds=10, rate=HONEST_RATE) as front:
-                yield front, process.pid
-        else:
-            yield address, process.pid
+        yield (told[1], int(told[2])), process.pid
     finally:
         process.terminate()
         process.wait(90)

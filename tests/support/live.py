@@ -12,9 +12,8 @@ from fastapi.testclient import TestClient
 from starlette.types import ASGIApp
 
 from service.http.app import create_app
-from service.http.server import DrainingServer
+from service.http.server import Server, configuration
 from service.settings import Settings
-from service.workers.costs import Cost
 from service.workers.jobs import Done, Work
 from tests.support import stand_in_jobs as jobs
 
@@ -27,13 +26,12 @@ def local(app: ASGIApp, **options: Any) -> TestClient:
 @contextmanager
 def served(
     job: Callable[[Work], Done] = jobs.obey,
-    measure: Callable[[Work], Cost] = jobs.measure,
     **settings: Any,
 ) -> Iterator[tuple[str, int]]:
     """Host and port of a server whose workers obey their request's body, or do another job."""
     chosen = Settings(**{"port": 0} | settings)
-    app = create_app(chosen, job=job, warm_up=jobs.no_warm_up, measure=measure)
-    server = DrainingServer(app, chosen)
+    app = create_app(chosen, job=job, warm_up=jobs.no_warm_up)
+    server = Server(configuration(app, chosen))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

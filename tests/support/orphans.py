@@ -37,7 +37,7 @@ def serve(pipe: Path) -> None:
     async def scenario() -> None:
         workers = Workers(1, 3600, stand_in_jobs.nothing)
         workers.start()
-        await workers.run(hold_open, pipe)
+        await workers.run(workers.join("a"), hold_open, pipe)
 
     asyncio.run(scenario())
 

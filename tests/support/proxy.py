@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import socket
@@ -52,6 +53,9 @@ def proxied(
     whose = "set_real_ip_from 127.0.0.1; real_ip_header X-Client;"
     text = text.replace("server_tokens off;", f"server_tokens off; {whose}")
     text = re.sub(r"(client_\w+_timeout|lingering_time) 10s", rf"\1 {seconds}s", text)
+    if os.geteuid() == 0:
+        # Else its workers are nobody's, who may not write into this folder.
+        text = f"user root;\n{text}"
     (folder / "nginx.conf").write_text(text)
     command = [program, "-p", folder, "-c", folder / "nginx.conf", "-g", "daemon off;"]
     errors = folder / "error.log"

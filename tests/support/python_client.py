@@ -14,9 +14,7 @@ sys.path.insert(0, folder)
 
 from generated import Client  # noqa: E402
 from generated.api.default import limits, models, report, subdivide  # noqa: E402
-from generated.api.jobs import create_job, read_job, read_job_result  # noqa: E402
 from generated.models import (  # noqa: E402
-    CreateJobFilesBody,
     Problem,
     ReportFilesBody,
     SubdivideFilesBody,
@@ -37,17 +35,11 @@ with Client(address, timeout=600) as client:
     raw = subdivide.sync(client=client, body=file(), levels=2, scheme=SubdivideScheme("loop"))
     made = report.sync(client=client, body=ReportFilesBody(file()))
     refused = subdivide.sync(client=client, body=SubdivideFilesBody(file()), levels=7)
-    job = create_job.sync(client=client, body=CreateJobFilesBody(file()))
-    while job.state in ("queued", "running"):
-        job = read_job.sync(job.id, client=client)
-    fetched = read_job_result.sync(job.id, client=client)
     seen = {
         "scheme": made["scheme"],
         "problem": refused.code if isinstance(refused, Problem) else None,
         "body_bytes": limits.sync(client=client).body_bytes,
         "models": [model.name for model in models.sync(client=client)],
-        "job": str(job.state),
         "raw": raw.payload.read() == Path(output).read_bytes(),
-        "fetched": fetched.payload.read(4).decode(),
     }
 print(json.dumps(seen))

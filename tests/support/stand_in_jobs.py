@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 from service.errors import GltfError, LimitError, NoModelError, UnreadableError
 from service.options import Limits
 from service.workers import memory_file
-from service.workers.costs import Cost
 from service.workers.jobs import Done, Work, hold_model, job_memory
 from service.workers.progress import Reporter
 
@@ -51,21 +50,6 @@ def stay_away(seconds: float, model: object) -> None:
 
 def fails_to_warm_up(model: object) -> None:
     raise NoModelError("no such thing")
-
-
-def measure(work: Work) -> Cost:
-    """One second for a body that begins with `sleep` or the like, nothing for a `short` one."""
-    short = memory_file.read(work.body).startswith(b"short")
-    return Cost(4, 1, 0.01 if short else 1.0)
-
-
-def measure_in_the_end(work: Work) -> Cost:
-    """The same; of `measured FOLDER` once it may be, and a file there tells that it is begun."""
-    word, _, folder = memory_file.read(work.body).decode().partition(" ")
-    if word == "measured":
-        tell(Path(folder) / f"began-{os.getpid()}")
-        wait_for(Path(folder) / "go")
-    return measure(work)
 
 
 def obey(work: Work) -> Done:
@@ -108,7 +92,7 @@ def obey(work: Work) -> Done:
         case "pid":
             body = str(os.getpid()).encode()
     fill(work, body)
-    return Done({"read": 0.001, "refine": 0.002}, None)
+    return Done({"read": 0.001, "refine": 0.002}, None, faces=4)
 
 
 def fill(work: Work, data: bytes) -> None:
@@ -138,19 +122,6 @@ def take_steps(reporter: Reporter, folder: Path) -> None:
         while not (folder / f"go-{number}").exists():
             time.sleep(0.002)
             reporter.reach(number / 4)
-
-
-def stopped_once(work: Work) -> Done:
-    """The process's number, once it has been stopped; `short FOLDER` is where it says that."""
-    reporter = Reporter(work.page)
-    folder = Path(memory_file.read(work.body).decode().partition(" ")[2])
-    if not (folder / "began").exists():
-        tell(folder / "began")
-        while True:
-            reporter.reach(0.5)
-            time.sleep(0.002)
-    fill(work, str(os.getpid()).encode())
-    return Done({}, None)
 
 
 def digest(work: Work) -> Done:

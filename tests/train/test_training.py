@@ -163,7 +163,8 @@ def ignore(done, loss):
     pass
 
 
-@pytest.mark.parametrize("name", RECIPES)
+# Those that read a folder of shapes: test_directed_training.
+@pytest.mark.parametrize("name", sorted(RECIPES.keys() - {"directed"}))
 def test_same_seed_same_bits(name):
     recipe = tiny(RECIPES[name](3))
     torch.manual_seed(1)

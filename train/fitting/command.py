@@ -1,7 +1,7 @@
 """`python train/run.py train`: a checkpoint, and the held-out table."""
 
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -16,8 +16,9 @@ from pns_common import PnsError, pns
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import Fit, fit
 from train.metrics.card import card_metrics
-from train.metrics.one_step import improvement_table, improvements_as_data
+from train.metrics.one_step import Improvement, improvement_table, improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
+from train.models.networks import BoundedNet
 from train.models.recipe import Recipe, of_length
 from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
@@ -45,6 +46,12 @@ def train_command(
     seed: Annotated[int, typer.Option(min=0, help="Of the weights and batches.")] = 0,
     steps: Annotated[int | None, typer.Option(min=1, help="In place of the recipe's.")] = None,
     output: Output = None,
+    shapes: Annotated[
+        Path, typer.Option(help="Folder that `train/run.py shapes` made; some recipes read it.")
+    ] = Path("build/shapes"),
+    pairs: Annotated[Path, typer.Option(help="Where pairs made of these shapes are kept.")] = Path(
+        "build/pairs"
+    ),
 ) -> None:
     """Train a recipe, write its checkpoint and print the held-out table."""
     console = Console()
@@ -56,7 +63,12 @@ def train_command(
     began = time.perf_counter()
     with _progress(console) as progress:
         task = progress.add_task(f"training {chosen.name}", total=chosen.steps, loss=float("nan"))
-        trained = fit(chosen, lambda done, loss: progress.update(task, completed=done, loss=loss))
+        with _errors_told(console):
+            trained = fit(
+                chosen,
+                lambda done, loss: progress.update(task, completed=done, loss=loss),
+                (shapes, pairs),
+            )
     _measure_and_save(path, chosen, trained, console)
     _say_written(path, began, console)
 
@@ -74,8 +86,10 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
 def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
     network = trained.network
     others = trained.vertex_network, trained.sharpness_network, trained.face_network
-    scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
-    improvements = card_metrics(recipe, scheme)
+    improvements: Mapping[str, Mapping[str, Improvement]] = {}
+    if isinstance(network, BoundedNet):
+        scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
+        improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
     machine = machine_fingerprint()
     save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, *others))

@@ -2,20 +2,24 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from pns_common import ParameterError
 from train.data.batch import Batch, disjoint_union
 from train.data.datasets import DATASETS, Instance
 from train.fitting.determinism import deterministic
 from train.fitting.limit_trainer import fit_to_limit
+from train.fitting.pairs_trainer import fit_to_pairs
 from train.fitting.quiet import quiet_term
+from train.models.directed import DirectedNet
 from train.models.from_recipe import initial_network, paper_rule
 from train.models.networks import BoundedNet, SharpNet
-from train.models.recipe import LossWeights, OneStep, Recipe, ToLimit, one_step
+from train.models.recipe import LossWeights, OneStep, OnPairs, Recipe, ToLimit, one_step
 from train.reference import Step
 from train.surfaces.implicit import signed_distance, unit_normal
 from train.tensors import dot, unit
@@ -33,16 +37,29 @@ class Fit:
     The others than `network` are None where the recipe has none.
     """
 
-    network: BoundedNet
+    network: BoundedNet | DirectedNet
     losses: tuple[float, ...]
     vertex_network: BoundedNet | None = None
     sharpness_network: SharpNet | None = None
     face_network: BoundedNet | None = None
 
 
-def fit(recipe: Recipe, on_step: OnStep) -> Fit:
-    """Train the operator with Adam, on what the recipe says."""
+def fit(recipe: Recipe, on_step: OnStep, folders: tuple[Path, Path] | None = None) -> Fit:
+    """Train the operator with Adam, on what the recipe says.
+
+    Args:
+        recipe: what to train.
+        on_step: called after each step with the number of steps done and the loss.
+        folders: of prepared shapes and of pairs, for recipes that train on stored pairs.
+
+    Raises:
+        ParameterError: the recipe trains on stored pairs, and no folders are given.
+    """
     match recipe.training:
+        case OnPairs() as plan:
+            if folders is None or recipe.directed is None:
+                raise ParameterError("folders", folders, expected="folders of shapes and pairs")
+            return Fit(*fit_to_pairs(recipe, recipe.directed, plan, folders, on_step))
         case ToLimit() as plan:
             made, losses = fit_to_limit(recipe, plan, on_step)
             return Fit(made.edge, losses, made.vertex, made.sharp, made.face)

@@ -15,7 +15,9 @@ from torch import Tensor
 
 from pns_common import ModelError
 from pns_common.files import replace_file
+from train.models.directed import DirectedNet
 from train.models.from_recipe import (
+    initial_directed,
     initial_face_network,
     initial_network,
     initial_sharpness_network,
@@ -34,7 +36,7 @@ class Checkpoint:
 
     Attributes:
         recipe: fixes the training.
-        network: float32.
+        network: float32; of directed edges where the recipe is.
         metrics: held-out results, as on the model card.
         machine: fingerprint of the machine that trained it; elsewhere the last bits may differ.
         vertex_network: float32, where the recipe has a vertex rule.
@@ -42,7 +44,7 @@ class Checkpoint:
     """
 
     recipe: Recipe
-    network: BoundedNet
+    network: BoundedNet | DirectedNet
     metrics: dict[str, Any]
     machine: str
     vertex_network: BoundedNet | None = None
@@ -83,7 +85,8 @@ def load_checkpoint(path: Path) -> Checkpoint:
             metadata = file.metadata() or {}
             state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts = msgspec.json.decode(metadata[METADATA_KEY], type=_Facts)
-        network = initial_network(facts.recipe)
+        made = initial_network if facts.recipe.directed is None else initial_directed
+        network = made(facts.recipe)
         vertex = initial_vertex_network(facts.recipe)
         sharpness = initial_sharpness_network(facts.recipe)
         face = initial_face_network(facts.recipe)
@@ -102,7 +105,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
 
 
 def joined_state(
-    network: BoundedNet,
+    network: BoundedNet | DirectedNet,
     vertex_network: BoundedNet | None,
     sharpness_network: SharpNet | None,
     face_network: BoundedNet | None = None,

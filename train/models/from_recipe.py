@@ -17,6 +17,7 @@ from pns_common.model.features import (
     FeatureSet,
     Symmetries,
 )
+from train.models.directed import DirectedNet
 from train.models.networks import (
     INPUT_COUNT,
     BoundedNet,
@@ -66,6 +67,20 @@ def initial_network(recipe: Recipe) -> BoundedNet:
         return BoundedNet(INPUT_COUNT[recipe.features], recipe.hidden, recipe.activation, generator)
     seen = FEATURE_SETS[recipe.features]
     return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.hidden, generator)
+
+
+def initial_directed(recipe: Recipe) -> DirectedNet:
+    """Return the untrained network of directed edges of a recipe.
+
+    Raises:
+        ParameterError: it has none.
+    """
+    form = recipe.directed
+    if form is None:
+        raise ParameterError("recipe", recipe.name, expected="one of directed edges")
+    generator = torch.Generator().manual_seed(recipe.seed)
+    faces = form.base == "catmull-clark"
+    return DirectedNet(generator, form.width, form.hidden, form.rounds, faces=faces)
 
 
 def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:

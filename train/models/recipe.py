@@ -82,6 +82,34 @@ class ScaleFree:
     sharpness_levels: int
 
 
+@dataclass(frozen=True, slots=True)
+class DirectedForm:
+    """The rule of directed edges and its network (format 5), as on the card.
+
+    Attributes:
+        base: the base scheme, "loop" or "catmull-clark".
+        width, hidden, rounds: of states, of hidden layers, and of messages.
+        budget: C.
+        gate_sharpness, vertex_gate_sharpness: c, c_v.
+        network_scale: τ, in edge lengths.
+        curve_strength: of the prior along boundaries.
+        fold_angle: θ, degrees.
+        sharpness_levels: at how many levels sharp edges stay sharp; training takes two.
+    """
+
+    base: str
+    width: int
+    hidden: int
+    rounds: int
+    budget: float
+    gate_sharpness: float
+    vertex_gate_sharpness: float
+    network_scale: float
+    curve_strength: float
+    fold_angle: float
+    sharpness_levels: int
+
+
 class OneStep(msgspec.Struct, frozen=True, tag=True):
     """Training on one step, at the inserted vertices, over a fixed data set.
 
@@ -100,6 +128,44 @@ class OneStep(msgspec.Struct, frozen=True, tag=True):
     batch_size: int
     final_learning_rate: float
     quiet: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PairWeights:
+    """Weights of errors over the base scheme's on a pair (train/fitting/training_pair.py).
+
+    Attributes:
+        mean, spread, peak: of distances: mean, root mean square, 8-norm.
+        normal: mean chord between normals.
+        worse: beside each of these, what is above `worse_from`.
+    """
+
+    mean: float
+    spread: float
+    peak: float
+    normal: float
+    worse: float
+    worse_from: float
+
+
+class OnPairs(msgspec.Struct, frozen=True, tag=True):
+    """Training on stored pairs of real shapes and of the procedural stream.
+
+    Attributes:
+        weights: of the loss.
+        meshes: in each step.
+        real: how often a pair is of a real shape.
+        kinds: how often these are of each kind, up to a factor.
+        procedural: pairs of the stream.
+        most_faces: larger coarse meshes are left out.
+    """
+
+    weights: PairWeights
+    meshes: int
+    real: float
+    kinds: dict[str, float]
+    procedural: int
+    most_faces: int
 
 
 class ToLimit(msgspec.Struct, frozen=True, tag=True):
@@ -141,6 +207,7 @@ class Recipe:
         scale_free: the rule of format 4; None is the paper's.
         sharpness: its sharpness network.
         face: its network of face vertices, over Catmull–Clark.
+        directed: the rule of directed edges (format 5), in place of the four before.
     """
 
     name: str
@@ -149,7 +216,7 @@ class Recipe:
     activation: str
     budget: float
     gate_sharpness: float
-    training: OneStep | ToLimit
+    training: OneStep | ToLimit | OnPairs
     steps: int
     learning_rate: float
     seed: int
@@ -158,6 +225,7 @@ class Recipe:
     scale_free: ScaleFree | None = None
     sharpness: NetworkShape | None = None
     face: NetworkShape | None = None
+    directed: DirectedForm | None = None
 
 
 def one_step(recipe: Recipe) -> OneStep:

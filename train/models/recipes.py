@@ -7,10 +7,13 @@ from types import MappingProxyType
 import msgspec
 
 from train.models.recipe import (
+    DirectedForm,
     LimitWeights,
     LossWeights,
     NetworkShape,
     OneStep,
+    OnPairs,
+    PairWeights,
     Recipe,
     ScaleFree,
     ToLimit,
@@ -154,6 +157,53 @@ def general_quad(seed: int = 0) -> Recipe:
     )
 
 
+def directed(seed: int = 0) -> Recipe:
+    """Return the recipe of directed edges: real and procedural shapes, refined back."""
+    return Recipe(
+        name="directed",
+        features="directed-28",
+        hidden=(),
+        activation="silu",
+        budget=10.0,
+        gate_sharpness=1e7,
+        training=OnPairs(
+            weights=PairWeights(
+                mean=1.0, spread=0.5, peak=0.4, normal=2.0, worse=0.0, worse_from=0.95
+            ),
+            meshes=3,
+            real=0.6,
+            kinds={
+                "part": 0.32,
+                "scan": 0.15,
+                "sculpt": 0.17,
+                "medical": 0.1,
+                "game": 0.1,
+                "building": 0.08,
+                "terrain": 0.08,
+            },
+            procedural=875,
+            most_faces=1000,
+        ),
+        steps=6000,
+        learning_rate=2.5e-3,
+        seed=seed,
+        orientation="symmetric",
+        directed=DirectedForm(
+            base="loop",
+            width=20,
+            hidden=40,
+            rounds=2,
+            budget=10.0,
+            gate_sharpness=1e7,
+            vertex_gate_sharpness=1e4,
+            network_scale=0.3,
+            curve_strength=1.0,
+            fold_angle=75.0,
+            sharpness_levels=6,
+        ),
+    )
+
+
 RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
     {
         "paper": paper,
@@ -161,5 +211,6 @@ RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
         "signed": signed,
         "general": general,
         "general-quad": general_quad,
+        "directed": directed,
     }
 )

@@ -94,7 +94,7 @@ describe("access", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     await openDownloadOptions(page);
     await page.check("#attributes");
-    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.route(/\/subdivide\?/, (route) => route.abort());
     await page.click("#download");
     await page.locator("#problem").waitFor();
     const covered = () => page.evaluate(() => {

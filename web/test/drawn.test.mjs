@@ -157,7 +157,7 @@ describe("what is drawn", { skip: noBrowser, timeout: 1_800_000 }, () => {
       "usemtl red\nf 1 2 3\nusemtl green\nf 1 3 4",
     ].join("\n");
     const library = "newmtl red\nKd 0.9 0.02 0.02\nnewmtl green\nKd 0.02 0.9 0.02\n";
-    const sent = page.waitForRequest(/\/jobs\?/);
+    const sent = page.waitForRequest(/\/subdivide\?/);
     await choose(page, { name: "two.obj", mimeType: "", buffer: Buffer.from(text) }, { name: "colours.mtl", mimeType: "", buffer: Buffer.from(library) });
     assert.match((await sent).headers()["content-type"], /^multipart\/form-data/);
     await settled(page);

@@ -46,13 +46,13 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("an example that does not come leaves the welcome, without a word of a fault", async () => {
     const page = await visit({ live: true, foreseen: /ERR_FAILED/ });
-    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.route(/\/subdivide\?/, (route) => route.abort());
     await page.reload();
     await page.waitForEvent("requestfailed");
     await page.locator("#work").waitFor({ state: "hidden" });
     await page.locator("#welcome").waitFor();
     assert.ok(await page.isHidden("#problem"));
-    await page.unroute(/\/jobs\?/);
+    await page.unroute(/\/subdivide\?/);
     await page.click("#example");
     await settled(page);
   });
@@ -93,7 +93,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("an upload that shrinks by compression is sent compressed", async () => {
     const page = await visit({ hash: "#levels=1" });
-    const coming = page.waitForRequest(/\/jobs\?/);
+    const coming = page.waitForRequest(/\/subdivide\?/);
     const text = `${TETRAHEDRON.buffer}${"# a comment\n".repeat(1000)}`;
     await choose(page, { ...TETRAHEDRON, buffer: Buffer.from(text) });
     const sent = await coming;
@@ -277,11 +277,11 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     release();
     await settled(page);
     assert.equal(await focused(), "panel");
-    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.route(/\/subdivide\?/, (route) => route.abort());
     await page.selectOption("#levels", "3");
     await page.locator("#problem-close").press("Enter");
     assert.equal(await focused(), "panel");
-    await page.unroute(/\/jobs\?/);
+    await page.unroute(/\/subdivide\?/);
     await page.focus("#levels");
     await page.selectOption("#levels", "1");
     await page.locator("#label-right", { hasText: "1,488 faces" }).waitFor();

@@ -176,18 +176,18 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await choose(page, example);
     await settled(page);
     const refusal = { title: "A parameter is out of range", detail: "No.", parameter: "budget", status: 422 };
-    await page.route(/\/jobs\?/, (route) => route.fulfill({ status: 422, json: refusal }));
+    await page.route(/\/subdivide\?/, (route) => route.fulfill({ status: 422, json: refusal }));
     await page.click(".more summary");
     await page.fill("#strength", "150");
     await page.locator("#problem-pointer", { hasText: "budget" }).waitFor();
     assert.equal(await page.inputValue("#strength"), "100");
     assert.ok(!(await page.evaluate(() => location.hash)).includes("budget"));
-    await page.unroute(/\/jobs\?/);
-    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.unroute(/\/subdivide\?/);
+    await page.route(/\/subdivide\?/, (route) => route.abort());
     await page.selectOption("#levels", "2");
     await page.locator("#problem-again").waitFor();
     assert.equal(await page.inputValue("#levels"), "1");
-    await page.unroute(/\/jobs\?/);
+    await page.unroute(/\/subdivide\?/);
     await page.click("#problem-again");
     await settledWith(page, 16 * PART_FACES);
     assert.equal(await page.inputValue("#levels"), "2");
@@ -195,22 +195,20 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
 
   test("a file that is cancelled while its answer is read stays unrefined", async () => {
     const page = await visit({ hash: "#levels=1" });
-    await page.evaluate(() => {
-      const { arrayBuffer } = Blob.prototype;
-      const released = new Promise((resolve) => (window.release = resolve));
-      Blob.prototype.arrayBuffer = async function () {
-        // An answer, and no file of the user's.
-        if (!(this instanceof File)) {
-          window.reading = true;
-          await released;
-        }
-        return arrayBuffer.call(this);
-      };
-    });
+    let release, arrive;
+    const released = new Promise((resolve) => (release = resolve));
+    const arrived = new Promise((resolve) => (arrive = resolve));
+    const late = async (route) => {
+      const response = await route.fetch();
+      arrive();
+      await released;
+      await route.fulfill({ response }).catch(() => {});
+    };
+    await page.route(/\/subdivide\?/, late, { times: 1 });
     await choose(page, example);
-    await page.waitForFunction(() => window.reading);
+    await arrived;
     await page.click("#cancel");
-    await page.evaluate(() => window.release());
+    release();
     await page.waitForTimeout(1000);
     assert.ok(await page.isHidden("#label-right"));
     await page.click("#again");
@@ -244,11 +242,11 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   for (const [what, body] of Object.entries(UNSHOWABLE)) {
     test(`${what} that cannot be shown is no fault of the file, and can be tried again`, async () => {
       const page = await visit({ hash: "#levels=1" });
-      await page.route(/\/result$/, (route) => route.fulfill({ contentType: "model/gltf-binary", body }));
+      await page.route(/\/subdivide\?/, (route) => route.fulfill(mixed(body)));
       await choose(page, example);
       await page.locator("#problem-title", { hasText: "The result cannot be shown" }).waitFor();
       assert.match(await page.textContent("#label-left"), new RegExp(`${number(PART_FACES)} faces`));
-      await page.unroute(/\/result$/);
+      await page.unroute(/\/subdivide\?/);
       await page.click("#problem-again");
       await settledWith(page, 4 * PART_FACES);
     });
@@ -259,32 +257,36 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await choose(page, example);
     await settled(page);
     await page.selectOption("#format", "stl");
-    await page.route(/\/jobs\?/, (route) => route.abort());
+    await page.route(/\/subdivide\?/, (route) => route.abort());
     await page.click("#download");
     await page.locator("#problem").waitFor();
-    await page.unroute(/\/jobs\?/);
+    await page.unroute(/\/subdivide\?/);
     const { name } = await downloaded(page, "#problem-again");
     assert.equal(name, "part-refined.stl");
   });
 
-  test("a job that the service ends is told of, and one that it no longer knows: either can be tried again", async () => {
-    const page = await visit({ hash: "#levels=5&model=signed", expected: [404] });
-    const job = page.waitForResponse((answer) => answer.request().method() === "POST");
+  for (const [what, fulfil] of Object.entries({
+    "is refused": (route) => route.abort(),
+    "ends before its last boundary": (route) => route.fulfill({ ...mixed(part), body: mixed(part).body.subarray(0, -6) }),
+  })) {
+    test(`a connection that ${what} is tried once more, and that is said`, async () => {
+      const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+      const said = page.locator("#work-text", { hasText: "The connection broke, trying once more" }).waitFor();
+      await page.route(/\/subdivide\?/, fulfil, { times: 1 });
+      await choose(page, example);
+      await said;
+      await settledWith(page, 4 * PART_FACES);
+      assert.ok(await page.isHidden("#problem"));
+    });
+  }
+
+  test("a connection that breaks twice is a problem, and can be tried again", async () => {
+    const page = await visit({ hash: "#levels=1", foreseen: /ERR_FAILED/ });
+    await page.route(/\/subdivide\?/, (route) => route.abort(), { times: 2 });
     await choose(page, example);
-    const answer = await job;
-    const { id } = await answer.json();
-    // As a shutdown does, or another tab.
-    await fetch(new URL(`/jobs/${id}`, answer.url()), { method: "DELETE" });
-    await page.locator("#problem-title", { hasText: "The service ended the job" }).waitFor();
-    assert.ok(await page.isVisible("#problem-again"));
-    await page.route(/\/events$/, (route) =>
-      route.fulfill({ status: 404, json: { title: "There is no such job", detail: "It is gone." } }),
-    );
-    await page.selectOption("#levels", "1");
-    await page.locator("#problem-title", { hasText: "no such job" }).waitFor();
-    await page.unroute(/\/events$/);
+    await page.locator("#problem-title", { hasText: "The connection broke twice" }).waitFor();
     await page.click("#problem-again");
-    await settled(page);
+    await settledWith(page, 4 * PART_FACES);
   });
 
   test("a reader that did not come is told of, and comes once the page is loaded anew", async () => {
@@ -335,6 +337,13 @@ function endless(bytes) {
   json.accessors[0].count = 10 ** 7;
   json.asset.extras = { pns: {} };
   return write({ json, bin });
+}
+
+/** A whole stream with a file. */
+function mixed(bytes) {
+  const head = `--b\r\nContent-Description: file\r\nContent-Length: ${bytes.length}\r\n\r\n`;
+  const body = Buffer.concat([Buffer.from(head), bytes, Buffer.from("\r\n--b--\r\n")]);
+  return { contentType: "multipart/mixed; boundary=b", body };
 }
 
 async function settledWith(page, faces) {

@@ -12,7 +12,7 @@ import { PNS, serve } from "./support/server.mjs";
 
 const part = await readFile(new URL("./part.glb", import.meta.url));
 // One worker, nobody may wait, and no job is short enough for the worker of its own.
-const ALONE = { PNS_QUEUE: "0", PNS_SHORT_SECONDS: "0.02", PNS_METRICS_PORT: "0" };
+const ALONE = { PNS_QUEUE: "0", PNS_METRICS_PORT: "0" };
 const example = { name: "part.glb", mimeType: "", buffer: part };
 
 describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
@@ -69,24 +69,18 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
           if (working && value > 0 && value < 1) window.shares.add(value);
         }).observe(document.querySelector("#work"), { subtree: true, childList: true, attributes: true });
       });
-      const job = page.waitForResponse((answer) => answer.request().method() === "POST");
       await choose(page, example);
-      const { id } = await (await job).json();
       await page.waitForFunction(() => window.shares.size > 1);
       await server.reaches("pns_jobs_running", 1);
-      assert.equal((await slowJob(server)).status, 503);
-      const freed = page.waitForResponse((answer) => answer.request().method() === "DELETE");
+      assert.equal((await slowJob(server)).status, 429);
       const began = performance.now();
       await page.click("#cancel");
-      assert.equal((await freed).status(), 204);
-      t.diagnostic(`the worker was free ${Math.round(performance.now() - began)} ms after the click`);
       await server.reaches("pns_jobs_running", 0);
-      const state = await fetch(`${server.address}/jobs/${id}`);
-      assert.ok(state.status === 404 || (await state.json()).state === "cancelled");
+      t.diagnostic(`the worker was free ${Math.round(performance.now() - began)} ms after the click`);
       assert.ok(await page.isHidden("#work"));
       const next = await slowJob(server);
-      assert.equal(next.status, 202);
-      await fetch(`${server.address}${next.headers.get("Location")}`, { method: "DELETE" });
+      assert.equal(next.status, 200);
+      await next.leave();
       // The control mesh stays, and the worker takes the next job.
       await page.selectOption("#levels", "1");
       await settled(page);
@@ -96,12 +90,12 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   test("a service that goes away at work, in words, with another try", async () => {
     await with_({}, async ({ page, server }) => {
       // As soon as the page follows the job, seconds before it is done.
-      const followed = page.waitForResponse((answer) => answer.url().endsWith("/events"));
+      const followed = page.waitForResponse((answer) => answer.url().includes("/subdivide?"));
       await choose(page, example);
       await followed;
       await server.kill();
       await page.locator("#problem").waitFor();
-      assert.equal(await page.textContent("#problem-title"), "The connection broke");
+      assert.equal(await page.textContent("#problem-title"), "The connection broke twice");
       assert.ok(await page.isVisible("#problem-again"));
       assert.ok(await page.isHidden("#work"));
     }, { hash: "#levels=5", foreseen: /net::ERR_/ });
@@ -156,18 +150,19 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     }, { hash: "#levels=4" });
   });
 
-  test("503: a full queue, in words, with another try", async () => {
+  test("429: more than one client may have, in words, with another try", async () => {
     await with_(ALONE, async ({ page, server }) => {
-      const { id } = await (await slowJob(server)).json();
+      const job = await slowJob(server);
       await choose(page, example);
       await page.locator("#problem").waitFor();
-      assert.equal(await page.textContent("#problem-title"), "The service is busy");
+      assert.equal(await page.textContent("#problem-title"), "The client has too many requests under way");
       assert.notEqual(await page.textContent("#problem-detail"), "");
-      await fetch(`${server.address}/jobs/${id}`, { method: "DELETE" });
+      await job.leave();
+      await server.reaches("pns_requests_held", 0);
       await page.click("#problem-again");
       await settled(page);
       assert.ok(await page.isHidden("#problem"));
-    }, { expected: [503], hash: "#levels=3" });
+    }, { expected: [429], hash: "#levels=3" });
   });
 
   for (const [path, settings] of [
@@ -216,16 +211,13 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
         await page.locator("#key-form").waitFor();
         const sent = new Map();
         page.on("request", async (request) => {
-          const kind = new URL(request.url()).pathname.replace(/^\/jobs\/[^/]+/, "/jobs/ID");
-          sent.set(`${request.method()} ${kind}`, (await request.allHeaders()).authorization);
+          sent.set(`${request.method()} ${new URL(request.url()).pathname}`, (await request.allHeaders()).authorization);
         });
         await page.fill("#key", key);
         await page.keyboard.press("Enter");
         assert.equal(await page.evaluate(() => document.activeElement.id), "panel");
         await settled(page);
-        for (const kind of ["POST /jobs", "GET /jobs/ID/events", "GET /jobs/ID/result", "DELETE /jobs/ID"]) {
-          assert.equal(sent.get(kind), `Bearer ${key}`, kind);
-        }
+        assert.equal(sent.get("POST /subdivide"), `Bearer ${key}`);
         const stored = await page.evaluate(() =>
           JSON.stringify([{ ...localStorage }, { ...sessionStorage }, document.cookie, location.href]),
         );
@@ -240,11 +232,14 @@ describe("the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 });
 
-/** Ask for seconds of work. */
-function slowJob(server) {
-  return fetch(`${server.address}/jobs?levels=5`, {
+/** Ask for seconds of work; `leave` ends it. */
+async function slowJob(server) {
+  const leaving = new AbortController();
+  const answer = await fetch(`${server.address}/subdivide?levels=5`, {
     method: "POST",
-    headers: { "Content-Type": "model/gltf-binary" },
+    headers: { "Content-Type": "model/gltf-binary", Accept: "multipart/mixed" },
     body: part,
+    signal: leaving.signal,
   });
+  return { status: answer.status, leave: () => leaving.abort() };
 }

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.carry.carried import in_type_of
 from pns_common.carry.grid import rounded_rows
 from pns_common.mesh.normals import opposed_corners, perpendicular_tangents
 from pns_common.mesh.rows import cross, dot, marked, unit
@@ -317,10 +318,3 @@ def _tangents(
     if normals is None:
         return safe_unit(directions)
     return perpendicular_tangents(directions, normals, Blocks(available_threads()))
-
-
-def in_type_of(
-    old: Shaped[np.ndarray, "C K"], blended: Float[np.ndarray, "N K"]
-) -> Shaped[np.ndarray, "N K"]:
-    """Return blended values in a component type; integers are rounded, in place."""
-    return (blended if old.dtype.kind == "f" else np.rint(blended, out=blended)).astype(old.dtype)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from pns_common.carry.carried import in_type_of
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Cleaned, Mesh
 from pns_common.mesh.rows import marked
@@ -21,7 +22,7 @@ from ...meshes.weld import Weld
 from ...options import Options
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
-from .attributes import Columns, RefinedPrimitive, blend, in_type_of, refined_primitives
+from .attributes import Columns, RefinedPrimitive, blend, refined_primitives
 from .control_mesh import ControlMesh, slices
 from .mesh_refine import RefinedMesh
 from .normals import own_of_rows
@@ -150,12 +151,14 @@ def _split_primitive(
                 along, sign = split.linear(values[:, :3]), split.nearest(values[:, 3:])
                 after[name] = np.hstack([along, sign]).astype(values.dtype)
             elif name.startswith("TEXCOORD_") and before is primitive.attributes and smooth:
-                after[name] = in_type_of(values, _smooth(values, split, vertex, creases))
+                after[name] = in_type_of(
+                    values, _smooth(values, split, vertex, creases, limit=on_limit)
+                )
             else:
                 after[name] = blend(name, split, values, accessors[name])
         return after
 
-    smooth = options.uv == "smooth"
+    smooth, on_limit = options.uv == "smooth", options.limit and options.levels == 1
     attributes = columns(primitive.attributes, primitive.accessors)
     return replace(
         primitive,
@@ -171,11 +174,13 @@ def _smooth(
     split: PolygonSplit,
     vertex: Int[np.ndarray, " H"],
     creases: Creases,
+    *,
+    limit: bool,
 ) -> Float[np.ndarray, "M 2"]:
     """Return texture coordinates of a split that is smooth inside charts."""
     mesh = split.mesh
     asked = uv[mesh.corners], vertex, mesh.offsets, 1, creases, CATMULL_CLARK
-    values, corners = refined_charts(*asked)
+    values, corners = refined_charts(*asked, limit=limit)
     made = np.zeros((mesh.vertex_count + len(mesh.edges) + mesh.face_count, 2))
     made[split.quads.reshape(-1)] = values[corners.reshape(-1)]
     return made

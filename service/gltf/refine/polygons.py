@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from pns_common.carry import rules
 from pns_common.kernels.connectivity import pair_up
 from pns_common.mesh.mesh import Mesh
 from pns_common.mesh.rows import cross, distinct_rows, dot, norm, unit
@@ -346,15 +347,11 @@ class PolygonSplit:
 
     def linear(self, values: Shaped[np.ndarray, "N K"]) -> Float[np.ndarray, "M K"]:
         """Return values of old rows, of edges' middles and of polygons' means."""
-        own = values.astype(np.float64)
-        sums = np.add.reduceat(own[self.mesh.corners], self.mesh.offsets[:-1], axis=0)
-        means = sums / np.diff(self.mesh.offsets)[:, None]
-        return np.concatenate([own, own[self.mesh.edges].mean(axis=1), means])
+        return rules.linear(values.astype(np.float64), self.mesh, CATMULL_CLARK, Blocks())
 
     def nearest(self, values: Shaped[np.ndarray, "N K"]) -> Shaped[np.ndarray, "M K"]:
         """Return values of old rows, of edges' first ends and of polygons' first corners."""
-        first = self.mesh.corners[self.mesh.offsets[:-1]]
-        return np.concatenate([values, values[self.mesh.edges[:, 0]], values[first]])
+        return rules.nearest(values, self.mesh, CATMULL_CLARK, Blocks())
 
     @property
     def quads(self) -> Int[np.ndarray, "H 4"]:

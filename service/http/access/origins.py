@@ -1,15 +1,14 @@
-"""Hosts and origins: which pages may have a visitor's browser ask for work.
+"""Origins: which pages may have a visitor's browser ask for work.
 
 A browser sends a form to any host that a page names, without asking first; only the answer is kept
 from the page. So any page could use up its visitors' budgets, or their own machines, where the
 service listens for them alone. A page whose own name is made to lead to this machine (DNS
-rebinding) has the same origin and host: so the names of the service are listed, too.
+rebinding) has the same origin and host: so Starlette's TrustedHost checks the name, too.
 """
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
-from ipaddress import IPv4Address, IPv6Address, ip_address
+from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -22,7 +21,7 @@ from .. import problems
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 # What a browser says of who asks: a page of this origin, or nobody but the user.
 OWN = frozenset({"same-origin", "none"})
-LOOPBACK_HOSTS = ("localhost", "*.localhost")
+LOOPBACK_HOSTS = ("localhost", "*.localhost", "127.0.0.1", "[::1]")
 
 
 class ForeignOriginError(ServiceError):
@@ -33,41 +32,35 @@ class ForeignOriginError(ServiceError):
     title = "A page of another origin may not ask"
 
 
-class ForeignHostError(ServiceError):
-    """The request is for a host that is none of this service's names."""
-
-    status = 421
-    code = "foreign-host"
-    title = "This service has another name"
-
-
 def hosts_of(settings: Settings) -> tuple[str, ...]:
     """Return the patterns of host names that are served; those of loopback where only it is bound.
 
-    Behind a proxy the name is the proxy's.
+    Elsewhere any name is, unless they are listed: nobody knows what a network calls this machine.
     """
     if settings.hosts:
         return settings.hosts
     alone = is_loopback(settings.host) and not settings.proxies
-    return LOOPBACK_HOSTS if alone else ("*",)
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    return (*LOOPBACK_HOSTS, host) if alone else ("*",)
 
 
 def is_loopback(host: str) -> bool:
     """Return whether a host to listen on is reached from this machine alone."""
-    address = _address(host)
-    return host == "localhost" if address is None else address.is_loopback
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class Origins:
-    """ASGI layer that refuses requests for other hosts, and work that foreign pages ask for.
+    """ASGI layer that refuses work that foreign pages ask for.
 
     Clients that are no browsers send no origin, and are not asked for one.
     """
 
-    def __init__(self, app: ASGIApp, named: tuple[str, ...], hosts: tuple[str, ...]) -> None:
+    def __init__(self, app: ASGIApp, named: tuple[str, ...]) -> None:
         self.app = app
         self.named = frozenset(named)
-        self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -81,10 +74,6 @@ class Origins:
 
     def _check(self, method: str, sent: dict[bytes, str]) -> None:
         host = _host(f"//{sent.get(b'host', '')}")
-        # An address is no name that could be made to lead here.
-        served = _address(host) is not None or any(fnmatchcase(host, name) for name in self.hosts)
-        if not served:
-            raise ForeignHostError("the Host is none of this service's; PNS_HOSTS lists its names")
         if method not in SAFE and not self._may_ask(sent, host):
             raise ForeignOriginError(
                 "a page of another origin asks; PNS_CORS_ORIGINS names those that may"
@@ -98,13 +87,6 @@ class Origins:
             return site in OWN
         # To hosts without TLS browsers say the origin alone. Not its port: proxies leave it out.
         return origin is None or _host(origin) == host != ""
-
-
-def _address(host: str) -> IPv4Address | IPv6Address | None:
-    try:
-        return ip_address(host)
-    except ValueError:
-        return None
 
 
 def _host(address: str) -> str:

@@ -11,7 +11,7 @@ from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...log_lines import HEADER, REQUEST_ID, id_of
-from ..clients import Client
+from ..access.clients import Client
 
 log = logging.getLogger("pns.request")
 
@@ -28,7 +28,7 @@ class Entry:
     """A request that has ended.
 
     Attributes:
-        route: its pattern (`/jobs/{id}`), never what was in it; `none` where no route matched.
+        route: its pattern (`/assets/{name}`), never what was in it; `none` where none matched.
         code: the problem's code, or empty.
         received, sent: bytes of the bodies.
         began: seconds of Unix time.
@@ -52,7 +52,7 @@ class Journal:
     """ASGI layer that names requests and writes down how each ended, and tells others.
 
     Neither query strings nor paths are written: they may hold what a client would not like to see
-    in a log (the id of a job, a file's name).
+    in a log (a file's name).
     """
 
     def __init__(self, app: ASGIApp, *others: Callable[[Entry], None]) -> None:

@@ -1,11 +1,10 @@
-"""Metrics for Prometheus, on a port of their own."""
+"""Metrics for Prometheus, which prometheus_client serves on a port of their own."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -13,7 +12,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 from prometheus_client import (
-    CONTENT_TYPE_LATEST,
     CollectorRegistry,
     Counter,
     Gauge,
@@ -21,21 +19,17 @@ from prometheus_client import (
     Info,
     PlatformCollector,
     ProcessCollector,
-    generate_latest,
+    start_http_server,
 )
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from starlette.responses import PlainTextResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ...workers.catalogue import Catalogue
-from ...workers.job import Job
+from ...workers.models import Catalogue
+from ..jobs import Job
 from .journal import Entry
 
 # From a small mesh to the longest job.
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 600)
-# A text is made for a second, however often it is asked for.
-FRESH_SECONDS = 1.0
 
 
 class Metrics:
@@ -77,7 +71,7 @@ class Metrics:
         for stage, value in job.seconds.items():
             if stage == "queue":
                 self._queue_seconds.observe(value)
-            else:
+            elif stage != "total":
                 self._stage_seconds.labels(stage).observe(value)
         if job.done is not None:
             self._faces.labels("in").inc(job.done.faces_in)
@@ -92,19 +86,22 @@ class Metrics:
         """Show a number that is asked for at each scrape."""
         Gauge(name, text, registry=self.registry).set_function(value)
 
-    def tally(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
-        """Show counts that are kept elsewhere, by their names."""
-        self.registry.register(_Tally(name, text, label, counts))
+    def restarts(self, counts: Callable[[], Tally[str]]) -> None:
+        """Show how often workers were replaced, by cause."""
+        self.registry.register(_Restarts(counts))
+
+    def serve(self, host: str, port: int) -> int:
+        """Serve them in a thread, by prometheus_client; return the port. Raises OSError."""
+        server, _ = start_http_server(port, host, self.registry)
+        return server.server_port
 
 
-class _Tally(Collector):
-    def __init__(self, name: str, text: str, label: str, counts: Callable[[], Tally[str]]) -> None:
-        self._named = (name, text)
-        self._label = label
+class _Restarts(Collector):
+    def __init__(self, counts: Callable[[], Tally[str]]) -> None:
         self._counts = counts
 
     def collect(self) -> Iterable[Metric]:
-        family = CounterMetricFamily(*self._named, labels=[self._label])
+        family = CounterMetricFamily("pns_worker_restarts", "Workers replaced", labels=["cause"])
         for name, count in self._counts().items():
             family.add_metric([name], count)
         yield family
@@ -136,21 +133,3 @@ def _resident(pid: int) -> int:
     except OSError:
         return 0
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
-
-
-def scrapes(registry: CollectorRegistry, clock: Callable[[], float] = time.monotonic) -> ASGIApp:
-    """Return an application that answers GET /metrics with the state of a registry."""
-    text, made = b"", float("-inf")
-
-    async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        nonlocal text, made
-        if scope["path"] != "/metrics" or scope["method"] not in ("GET", "HEAD"):
-            answer: Response = PlainTextResponse("GET /metrics", 404)
-        else:
-            # Nothing is awaited: of many scrapes at once the first makes the text.
-            if clock() - made >= FRESH_SECONDS:
-                text, made = generate_latest(registry), clock()
-            answer = Response(text, media_type=CONTENT_TYPE_LATEST)
-        await answer(scope, receive, send)
-
-    return app

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, Mesh, ParameterError, loop, refine, subdivide
-from pns_common.interop.carried import (
-    CarriedMesh,
-    between,
-    join_by_position,
-    quad_corners,
-    refine_carried,
-)
+from pns_common.interop.carried import CarriedMesh, join_by_position, refine_carried
 from tests.support.meshes import bumpy_sphere, grid
-from tests.support.polygons import mixed_cube
 
 
 def seamed(vertices, faces):
@@ -81,24 +74,6 @@ def test_vertices_are_joined_by_first_appearance_and_minus_zero_is_zero():
     assert first.tolist() == [0, 1]
 
 
-@pytest.mark.parametrize(
-    ("kind", "a", "b", "half"),
-    [
-        (np.float32, 1, 2, 1.5),
-        (np.float64, 1, 2, 1.5),
-        (np.float16, 60000, 60000, 60000),
-        (np.uint8, 1, 4, 3),
-        (np.uint8, 255, 255, 255),
-        (np.int64, 7, 4, 7),
-        (np.bool_, True, False, True),
-    ],
-)
-def test_halfway_is_a_mean_of_numbers_and_the_first_of_labels(kind, a, b, half):
-    values = between(np.array([a], dtype=kind), np.array([b], dtype=kind))
-    assert values.dtype == kind
-    assert values.tolist() == [half]
-
-
 def test_isolated_vertices_stay():
     vertices, faces = bumpy_sphere()
     lone = np.concatenate([vertices, [[9.0, 9, 9]]])
@@ -123,18 +98,6 @@ def test_by_index_vertices_in_one_place_stay_apart_and_keep_their_numbers():
         assert len(made.vertices) == 12
     with pytest.raises(ParameterError, match="weld"):
         refine_carried(mesh, loop(), 1, {"weld": "off"})
-
-
-def test_corners_of_polygons_follow_the_split():
-    """Each quad's corners: the old one, both edges' middles and the face's mean, in its order."""
-    points, faces = mixed_cube()
-    mesh = Mesh(points, faces)
-    values = points[mesh.corners]  # a position as data of corners
-    made = quad_corners(values, mesh.topology())
-    # Where all edges are sharp, the base scheme puts their vertices into the middle.
-    sharp = refine(mesh, "catmull-clark", 1, creases=mesh.topology().edges.astype(np.int64)).mesh
-    np.testing.assert_allclose(made[:, 0], values)
-    np.testing.assert_allclose(made[:, 1:], sharp.vertices[sharp.faces][:, 1:])
 
 
 def test_a_library_of_triangles_refuses_quads():

@@ -196,9 +196,7 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
     ("settings", "said"),
     [
         ({"PNS_MODEL": "nope"}, "PNS_MODEL (or --model): model nope: "),
-        ({"PNS_STORE": "localhost:6379"}, "PNS_STORE: it is no address of a Redis, such as redis:"),
         ({"PNS_HOSTS": "pns.example,a b"}, "PNS_HOSTS: 'a b' is no host name"),
-        ({"PNS_UPLOAD_BYTES": "64MiB"}, "PNS_UPLOAD_BYTES must be a third more than PNS_BODY"),
     ],
 )
 def test_a_setting_that_cannot_be_used_ends_it_by_name(

@@ -145,12 +145,10 @@ def test_smooth_uvs_are_refined_as_positions_are_inside_a_chart(levels):
     shape = octahedron()
     shape["TEXCOORD_0"] = rng.random((6, 2))
     shape["POSITION"] = np.column_stack([shape["TEXCOORD_0"], rng.random(6)])
-    _, attributes = files.primitive_of(
-        subdivide([shape], uv="smooth", levels=levels, limit=False).glb
-    )
+    _, attributes = files.primitive_of(subdivide([shape], uv="smooth", levels=levels).glb)
     # One closed chart: the same stencils move both.
     np.testing.assert_allclose(attributes["TEXCOORD_0"], attributes["POSITION"][:, :2], atol=1e-6)
-    _, linear = files.primitive_of(subdivide([shape], levels=levels, limit=False).glb)
+    _, linear = files.primitive_of(subdivide([shape], levels=levels).glb)
     assert np.abs(linear["TEXCOORD_0"] - attributes["TEXCOORD_0"]).max() > 0.01
 
 
@@ -162,8 +160,7 @@ def test_smooth_uvs_have_the_creases_of_the_positions(crease, levels, meshes):
     shapes = [cylinder(sides) for sides in (7, 8, 12)[:meshes]]
     for shape in shapes:
         shape["TEXCOORD_0"] = shape["POSITION"][:, 1:]
-    options = {"uv": "smooth", "crease": crease, "levels": levels, "limit": False}
-    result = subdivide(*([shape] for shape in shapes), **options)
+    result = subdivide(*([shape] for shape in shapes), uv="smooth", crease=crease, levels=levels)
     assert result.report["levels"][0]["edges"]["crease"] > 0
     for mesh in range(meshes):
         _, attributes = files.primitive_of(result.glb, mesh)

@@ -17,16 +17,13 @@ def front(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[str, int]]:
     """The address of a service of small bodies, which waits for nobody for long."""
-    hurry = {"head_seconds": 0.5, "keep_alive_seconds": 0.5, "rate": 64 * MIB, "grace_seconds": 0.5}
     if request.param == "alone":
-        with served(workers=1, body=MIB, **hurry) as address:
+        with served(workers=1, body=MIB, idle_seconds=0.5, keep_alive_seconds=1) as address:
             yield address
     else:
         folder = tmp_path_factory.mktemp("front")
-        # The proxy keeps connections to the service for four seconds.
-        hurry |= {"head_seconds": 10, "keep_alive_seconds": 5}
         with (
-            served(workers=1, body=MIB, proxies="127.0.0.1", **hurry) as behind,
+            served(workers=1, body=MIB, proxies="127.0.0.1") as behind,
             proxied(behind, folder) as address,
         ):
             yield address

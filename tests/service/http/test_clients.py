@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+from contextlib import ExitStack
+
 import pytest
 from fastapi import Request
 
-from service.http.clients import Client, client_of
+from service.errors import BusyError
+from service.http.access.clients import (
+    Client,
+    FacesBudget,
+    OverBudgetError,
+    Places,
+    TooManyRequestsError,
+    client_of,
+)
 from service.settings import Settings
 
 
@@ -34,5 +45,66 @@ def test_a_request_from_nowhere_is_a_client_too() -> None:
 
 
 def test_a_client_that_was_found_before_stands() -> None:
-    named = Client("key:mine", 5, named=True)
+    named = Client("key:mine", 5)
     assert client_of(request(("192.0.2.7", 1), client=named), Settings()) is named
+
+
+def test_a_client_has_so_many_places_and_all_together_so_many() -> None:
+    places = Places(4, own=2)
+    with ExitStack() as held:
+        for client in "aabb":
+            held.enter_context(places.held(client))
+        with pytest.raises(TooManyRequestsError, match="as many as one client may") as own:
+            held.enter_context(places.held("a"))
+        assert (own.value.status, own.value.retry_after) == (429, 2)
+        with pytest.raises(BusyError, match="4 requests") as full:
+            held.enter_context(places.held("c"))
+        assert full.value.status == 503
+    assert places.taken == {}
+    with places.held("a"):
+        assert places.taken == {"a": 1}
+
+
+def test_a_slow_reader_gives_its_place_to_a_client_who_holds_less() -> None:
+    """Two addresses that hardly read their answers would else close the service."""
+
+    async def scenario() -> None:
+        places, ended = Places(4, own=3), []
+
+        async def takes(client: str) -> None:
+            end = asyncio.timeout(None)
+            with places.held(client), places.taking(client, end):
+                try:
+                    async with end:
+                        await asyncio.sleep(60)
+                except TimeoutError:
+                    ended.append(client)
+
+        slow = [asyncio.create_task(takes(client)) for client in "aaab"]
+        await asyncio.sleep(0)
+        with pytest.raises(BusyError), places.held("b"), places.held("b"), places.held("b"):
+            pass
+        with places.held("honest"):
+            await asyncio.sleep(0.01)
+        assert ended == ["a"] * 2
+        for task in slow:
+            task.cancel()
+        await asyncio.gather(*slow, return_exceptions=True)
+
+    asyncio.run(scenario())
+
+
+def test_a_budget_refills_evenly_and_a_job_may_leave_a_debt() -> None:
+    now = [0.0]
+    budget, client = FacesBudget(lambda: now[0]), Client("a", 60)
+    budget.check(client)
+    budget.charge(client, 90)
+    with pytest.raises(OverBudgetError) as over:
+        budget.check(client)
+    assert (over.value.status, over.value.retry_after) == (429, 31)
+    budget.check(Client("b", 60))
+    now[0] = 30.5
+    budget.check(client)
+    unbounded = Client("c", None)
+    budget.charge(unbounded, 10**9)
+    budget.check(unbounded)

@@ -74,7 +74,7 @@ def test_answers_beside_clients_that_disconnect_are_each_of_their_own_input() ->
             for _ in range(RUDE):
                 clients.create_task(rude(where, DISCONNECTS // RUDE))
 
-    with served(jobs.digest, workers=4, queue=100) as where:
+    with served(jobs.digest, workers=4, queue=100, client_requests=104) as where:
         asyncio.run(scenario(where))
     assert wrong == []
 

@@ -20,7 +20,7 @@ GLB = {"Content-Type": "model/gltf-binary"}
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
     settings = Settings(workers=1, queue=1, body=2**20, levels=5)
-    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
     with local(app, raise_server_exceptions=False) as opened:
         wait_until_ready(opened)
         yield opened
@@ -197,7 +197,7 @@ def test_415_for_a_body_in_an_encoding_that_is_not_taken(client: TestClient) -> 
     assert_problem(answer, 415, "unsupported-media-type")
 
 
-@pytest.mark.parametrize("path", ["/jobs/", "/models/", "/subdivide/"])
+@pytest.mark.parametrize("path", ["/docs/none/", "/models/", "/subdivide/"])
 def test_a_slash_too_many_leads_nowhere(client: TestClient, path: str) -> None:
     answer = client.get(path, headers={"Host": "elsewhere.localhost"}, follow_redirects=False)
     assert_problem(answer, 404, "not-found")
@@ -209,9 +209,8 @@ def test_404_and_405_are_problems_too(client: TestClient) -> None:
     assert nothing["detail"] == "there is nothing at this path; /docs shows what there is"
     for path, allowed in {
         "/subdivide": "POST",
-        "/jobs": "POST",
-        "/jobs/one": "HEAD, GET, DELETE",
-        "/jobs/one/result": "HEAD, GET",
+        "/report": "POST",
+        "/limits": "HEAD, GET",
         "/": "HEAD, GET",
     }.items():
         wrong = client.put(path)
@@ -232,9 +231,7 @@ def test_500_keeps_our_faults_in_the_log(
 
 
 def test_500_in_the_server_itself_is_a_problem_too() -> None:
-    app = create_app(
-        Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up
-    )
+    app = create_app(Settings(workers=1), job=jobs.obey, warm_up=jobs.no_warm_up)
 
     @app.get("/breaks")
     async def breaks() -> None:
@@ -265,7 +262,7 @@ def test_413_for_a_job_that_takes_more_than_was_predicted(client: TestClient) ->
 
 def test_504_for_a_job_past_its_time() -> None:
     settings = Settings(workers=1, job_seconds=2)
-    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
     with local(app, raise_server_exceptions=False) as client:
         # A worker that still starts leaves a job no time.
         wait_until_ready(client)
@@ -273,45 +270,8 @@ def test_504_for_a_job_past_its_time() -> None:
         wait_until_ready(client)
 
 
-def test_503_while_the_service_drains(client: TestClient) -> None:
-    gate = client.app.state.admission
-    gate.draining = True
-    try:
-        answer = post(client, b"x")
-        assert_problem(answer, 503, "draining")
-        assert int(answer.headers["retry-after"]) >= 1
-        assert_problem(client.get("/readyz"), 503, "draining")
-        assert client.get("/healthz").status_code == 200
-    finally:
-        gate.draining = False
-
-
-def test_503_for_a_result_that_finds_no_room_and_it_still_waits_to_be_fetched() -> None:
-    """A client that is told to come back finds its result, though the service is shutting down."""
-    settings = Settings(workers=1, answer_bytes=9)
-    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
-    with local(app, raise_server_exceptions=False) as client:
-        wait_until_ready(client)
-        gate = client.app.state.admission
-        job = client.post("/jobs", content=b"sleep 0.3", headers=GLB).json()["id"]
-        gate.draining = True
-        while client.get(f"/jobs/{job}").json()["state"] != "done" or gate.admitted != 1:
-            pass
-        with client.portal.wrap_async_context_manager(gate.answering("another client", 1)):
-            refused = client.get(f"/jobs/{job}/result")
-        assert_problem(refused, 503, "busy")
-        assert int(refused.headers["retry-after"]) >= 1
-        assert client.get("/healthz").status_code == 200
-        assert gate.admitted == 1
-        assert client.get(f"/jobs/{job}/result").content == b"sleep 0.3"
-        while gate.admitted:
-            pass
-
-
 def test_503_without_a_model() -> None:
-    app = create_app(
-        Settings(workers=1), job=jobs.obey, measure=jobs.measure, warm_up=jobs.fails_to_warm_up
-    )
+    app = create_app(Settings(workers=1), job=jobs.obey, warm_up=jobs.fails_to_warm_up)
     with local(app) as client:
         assert_problem(client.get("/readyz"), 503, "no-model")
         # What needs no model is served.

@@ -62,23 +62,6 @@ def wait_until_served(address):
     pytest.fail("the service does not recover")
 
 
-def trickle(connection, piece=b"x"):
-    """Send a piece now and then, until the server ends the connection; return what it said."""
-    connection.settimeout(0.05)
-    said = b""
-    for _ in range(int(PATIENCE / 0.05)):
-        try:
-            connection.sendall(piece)
-            if not (got := connection.recv(2**16)):
-                return said
-            said += got
-        except TimeoutError:
-            continue
-        except OSError:
-            return said
-    pytest.fail("the connection does not end")
-
-
 @pytest.mark.parametrize(
     ("method", "path"),
     [("GET", "/healthz"), ("POST", "/nothing"), ("POST", "/subdivide?levels=9")],
@@ -118,27 +101,6 @@ def test_a_body_in_countless_pieces_keeps_nobody_out(front):
     wait_until_served(front)
 
 
-@pytest.mark.parametrize("first", [b"", b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-"])
-def test_a_connection_that_asks_for_nothing_is_ended(front, first):
-    with connect(front) as connection:
-        connection.sendall(first)
-        assert b"200 OK" not in received(connection)
-
-
-def test_a_head_that_trickles_is_ended(front):
-    with connect(front) as connection:
-        connection.sendall(b"GET /healthz HTTP/1.1\r\nX-")
-        assert b"200 OK" not in trickle(connection)
-
-
-def test_408_for_an_upload_below_the_least_rate(front):
-    with connect(front) as connection:
-        connection.sendall(head("POST", "/subdivide", f"Content-Length: {2**20}\r\n"))
-        answer = trickle(connection, bytes(100))
-    assert status(answer) == 408
-    assert b"slower than" in answer
-
-
 def test_a_client_that_only_sends_and_never_reads_keeps_nobody_out(front):
     with connect(front) as connection, suppress(OSError):
         connection.settimeout(2)
@@ -168,44 +130,6 @@ def test_what_is_no_http_is_refused_and_not_repeated_in_the_log(front, sent, cap
     # What could not be read may have been a key.
     assert "secret" not in caplog.text
     wait_until_served(front)
-
-
-def test_a_connection_that_asks_again_and_again_is_kept(front):
-    """Each of its answers is whole whenever the service looks."""
-    with closing(http.client.HTTPConnection(*front, timeout=PATIENCE)) as connection:
-        until = time.monotonic() + 2
-        while time.monotonic() < until:
-            connection.request("GET", "/healthz")
-            answer = connection.getresponse()
-            answer.read()
-            assert (answer.status, answer.will_close) == (200, False)
-            # The proxy takes no more than twenty in a second.
-            time.sleep(0.06)
-
-
-def test_hundreds_of_silent_connections_are_gone_and_keep_nobody_out(front):
-    """More than there are slots for: the service alone refuses meanwhile, and then recovers."""
-    with ExitStack() as opened:
-        for _ in range(700):
-            with suppress(OSError):
-                opened.enter_context(connect(front))
-        wait_until_served(front)
-
-
-def test_the_service_recovers_from_more_requests_than_it_has_connections():
-    """Uploads that stall fill all that there is; once they end, the next client is served.
-
-    Probes are answered meanwhile: else a cluster would end the service for it.
-    """
-    with served(workers=1, connections=4, idle_seconds=0.5) as address, ExitStack() as opened:
-        for _ in range(300):
-            with suppress(OSError):
-                connection = opened.enter_context(connect(address))
-                connection.sendall(head("POST", "/subdivide", "Content-Length: 1000\r\n"))
-        with closing(http.client.HTTPConnection(*address, timeout=PATIENCE)) as probe:
-            probe.request("GET", "/healthz")
-            assert probe.getresponse().status == 200
-        wait_until_served(address)
 
 
 def test_behind_the_proxy_one_address_that_fills_its_share_keeps_nobody_out(tmp_path):

@@ -15,12 +15,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from pns_common.model.file import DEFAULT_MODEL, load_model
-from service.http.admission import Admission
 from service.http.app import create_app
-from service.http.service import ReadOnce
+from service.http.jobs import Service
 from service.meshfiles.example import part_glb
 from service.settings import Settings
-from service.workers.catalogue import Catalogue
+from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 from tests.support.networks import DEFAULT_CARD
@@ -52,18 +51,21 @@ def test_however_many_ask_at_first_one_worker_reads_the_catalogue() -> None:
     class Counted:
         reads = 0
 
-        async def run(self, read: Callable[[], Catalogue]) -> Catalogue:
+        def join(self, client: str) -> None:
+            pass
+
+        async def run(self, turn: None, read: Callable[[], Catalogue]) -> Catalogue:
             self.reads += 1
             await asyncio.sleep(0)
             return read()
 
     async def scenario() -> None:
-        workers = Counted()
-        admission = Admission(uploads=1, body_bytes=1, answer_bytes=1)
-        catalogue = ReadOnce(workers, admission, lambda: Catalogue(("a",), b"[]"))  # pyright: ignore
-        answers = await asyncio.gather(*(catalogue.get() for _ in range(20)))
+        workers, heard = Counted(), []
+        made = (Settings(), workers, jobs.obey, lambda: Catalogue(("a",), b"[]"), print)
+        service = Service(*made, heard.append)  # pyright: ignore
+        answers = await asyncio.gather(*(service.catalogue() for _ in range(20)))
         assert {answer.names for answer in answers} == {("a",)}
-        assert workers.reads == 1
+        assert (workers.reads, len(heard)) == (1, 1)
 
     asyncio.run(scenario())
 

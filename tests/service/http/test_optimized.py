@@ -19,7 +19,7 @@ from tests.support.live import local
 def main():
     if not sys.flags.optimize:
         raise SystemExit("not optimised")
-    stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
+    stand_ins = {"job": jobs.obey, "warm_up": jobs.no_warm_up}
     with local(create_app(Settings(workers=1, body=1000), **stand_ins)) as client:
         glb = {"Content-Type": "model/gltf-binary"}
         def status(path="/subdivide", body=b"x", **headers):

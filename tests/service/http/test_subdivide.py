@@ -253,8 +253,7 @@ def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> N
             report = report_of(client.post("/subdivide", content=part, headers=GLB))
             assert report["model"] == "zero"
             assert report["levels"][0]["proximity_ratio"]["max"] == 0
-    # One worker for any job, and the one for short jobs.
-    assert CountedModel.pickled == before + 2
+    assert CountedModel.pickled == before + 1
 
 
 def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
@@ -296,13 +295,3 @@ def test_an_answer_in_another_format_is_what_the_command_writes(
     written = converted(part_glb(), "glb", target, Options(levels=1, scheme="loop"), None, Limits())
     assert answer.content == written.content
     assert answer.headers["content-type"] == MEDIA_TYPES[target]
-
-
-def test_a_job_keeps_its_format(client: TestClient) -> None:
-    query = "levels=1&scheme=loop&format=off"
-    job = client.post(f"/jobs?{query}", content=part_glb(), headers=GLB)
-    result = f"{job.headers['location']}/result"
-    while (answer := client.get(result)).status_code == 409:
-        time.sleep(0.05)
-    assert answer.content.startswith(b"STNOFF")
-    assert answer.headers["content-type"] == "model/off"

@@ -4,8 +4,7 @@ import sys
 
 import pytest
 
-from service.http import layers
-from service.http.app import create_app
+from service.http.app import around, create_app
 from service.http.watch.metrics import Metrics
 from service.http.watch.tracing import TracingError, tracer_from_environment
 from service.settings import Settings
@@ -25,10 +24,9 @@ def traced():
     exporter, provider = InMemorySpanExporter(), trace.TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(exporter))
     settings = Settings(workers=1)
-    app = create_app(settings, job=jobs.obey, measure=jobs.measure, warm_up=jobs.no_warm_up)
+    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
     tracer = provider.get_tracer("tests")
-    around = (settings, 1, app.state.admission, Metrics(), None, tracer)
-    app.layers = lambda routes: layers.around(routes, *around)
+    app.layers = lambda routes: around(routes, settings, Metrics(), None, tracer)
     with local(app, raise_server_exceptions=False) as client:
         yield client, exporter.get_finished_spans
 

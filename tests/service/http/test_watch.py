@@ -3,25 +3,21 @@
 import json
 import logging
 import re
-import socket
-import threading
 import urllib.request
 from collections import Counter
-from contextlib import ExitStack, suppress
 from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from prometheus_client import CollectorRegistry, Gauge
+from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.http.app import create_app
-from service.http.server import metrics_server
-from service.http.watch.metrics import Metrics, scrapes
+from service.http.watch.metrics import Metrics
 from service.log_lines import LONGEST, REQUEST_ID, JsonLines, TerminalLines
 from service.settings import Settings
-from service.workers.catalogue import Catalogue
+from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 
@@ -148,7 +144,7 @@ def test_a_traceback_is_one_line():
 
 def test_what_a_worker_says_has_the_id_of_its_request(capfd):
     headers = GLB | {"X-Request-ID": "of-a-worker"}
-    stand_ins = {"job": jobs.obey, "measure": jobs.measure, "warm_up": jobs.no_warm_up}
+    stand_ins = {"job": jobs.obey, "warm_up": jobs.no_warm_up}
     with local(create_app(Settings(workers=1), **stand_ins)) as client:
         assert client.post("/subdivide", content=b"log", headers=headers).status_code == 200
     # The worker wrote before it answered.
@@ -175,77 +171,27 @@ def labelled(values, name, /, **labels):
 
 @pytest.fixture
 def scrape():
-    def of(metrics):
-        text = local(scrapes(metrics.registry)).get("/metrics").text
-        return values_of(text)
-
-    return of
+    return lambda metrics: values_of(generate_latest(metrics.registry).decode())
 
 
-def test_a_scrape_serves_those_that_come_within_a_second():
-    now = [100.0]
-    registry, made = CollectorRegistry(), []
-    Gauge("pns_made", "…", registry=registry).set_function(lambda: made.append(1) or len(made))
-    client = local(scrapes(registry, lambda: now[0]))
-    for seconds, times in ((0, 1), (0.9, 1), (1.0, 2)):
-        now[0] = 100.0 + seconds
-        assert f"pns_made {times}.0" in client.get("/metrics").text
-    assert len(made) == 2
-
-
-@pytest.mark.parametrize(("method", "path"), [("GET", "/"), ("POST", "/metrics")])
-def test_the_port_of_the_metrics_serves_nothing_else(method, path):
-    assert local(scrapes(CollectorRegistry())).request(method, path).status_code == 404
-
-
-@pytest.fixture
-def metrics_port():
-    """The address of a server of metrics that waits half a second for a head."""
-    server = metrics_server(Metrics(), Settings(metrics_port=0, head_seconds=0.5))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    yield server.listening[0].getsockname()
-    server.should_exit = True
-    thread.join()
-
-
-def ends(connection):
-    """Return whether the server ends a connection without a word."""
-    try:
-        return connection.recv(1) == b""
-    except ConnectionResetError:
-        return True
-
-
-def test_metrics_listen_on_loopback_unless_they_are_to_listen_elsewhere(metrics_port):
-    assert metrics_port[0] == "127.0.0.1"
-    settings = Settings(metrics_port=0, metrics_host="0.0.0.0")
-    (elsewhere,) = metrics_server(Metrics(), settings).listening
-    with elsewhere:
-        assert elsewhere.getsockname()[0] == "0.0.0.0"
-
-
-def test_half_sent_heads_end_and_metrics_are_served_beside_them(metrics_port):
-    with ExitStack() as opened:
-        heads = [
-            opened.enter_context(socket.create_connection(metrics_port, timeout=30))
-            for _ in range(100)
-        ]
-        for connection in heads:
-            with suppress(OSError):
-                connection.sendall(b"GET /metrics HTTP/1.1\r\nHost: a\r\nX-")
-        with urllib.request.urlopen("http://{}:{}/metrics".format(*metrics_port)) as answer:
-            assert answer.status == 200
-        assert all(ends(connection) for connection in heads)
+def test_prometheus_scrapes_a_port_of_their_own():
+    metrics = Metrics()
+    metrics.gauge("pns_made", "…", lambda: 3)
+    port = metrics.serve("127.0.0.1", 0)
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+        assert labelled(values_of(answer.read().decode()), "pns_made") == 3
 
 
 def test_requests_are_counted_by_route_status_and_code(client, scrape):
     client.post("/subdivide", content=b"echo", headers=GLB)
     client.post("/subdivide", content=b"unreadable", headers=GLB)
+    client.post("/subdivide", content=b"broken", headers=GLB | {"Accept": "multipart/mixed"})
     values = scrape(client.app.state.metrics)
     counted = {"route": "/subdivide", "method": "POST"}
     assert labelled(values, "pns_requests_total", **counted, status="400", code="unreadable") == 1
     assert labelled(values, "pns_requests_total", **counted, status="200", code="") >= 1
+    streamed = {"status": "200", "code": "invalid-gltf"}
+    assert labelled(values, "pns_requests_total", **counted, **streamed) == 1
     assert labelled(values, "pns_request_seconds_count", route="/subdivide") >= 2
     assert labelled(values, "pns_received_bytes_total", route="/subdivide") >= 14
     assert labelled(values, "process_open_fds") > 0
@@ -254,12 +200,12 @@ def test_requests_are_counted_by_route_status_and_code(client, scrape):
 
 def test_what_a_layer_refuses_is_counted_under_its_route(client, scrape):
     client.post("/subdivide", content=b"x", headers=GLB | {"Host": "another"})
-    client.get("/jobs/of-somebody", headers={"Host": "another"})
+    client.get("/assets/of-somebody", headers={"Host": "another"})
     client.post("/report", content=b"x", headers=GLB | {"Content-Length": str(2**40)})
     values = scrape(client.app.state.metrics)
     for route, method, status in (
-        ("/subdivide", "POST", "421"),
-        ("/jobs/{job_id}", "GET", "421"),
+        ("/subdivide", "POST", "400"),
+        ("/assets/{name}", "GET", "400"),
         ("/report", "POST", "413"),
     ):
         counted = {"route": route, "method": method, "status": status}
@@ -288,7 +234,7 @@ def test_jobs_faces_models_and_restarts_are_counted(scrape):
     entry = {"name": "general", "hash": "ab" * 32, "default": True}
     metrics.catalogue(Catalogue(("general",), json.dumps([entry]).encode()))
     metrics.gauge("pns_queue_jobs", "Jobs that wait", lambda: 3)
-    metrics.tally("pns_worker_restarts", "…", "cause", lambda: Counter(died=2))
+    metrics.restarts(lambda: Counter(died=2))
     values = scrape(metrics)
     assert labelled(values, "pns_faces_total", direction="in") == 4
     assert labelled(values, "pns_faces_total", direction="out") == 64

@@ -5,7 +5,6 @@ import pytest
 
 from service.errors import UnreadableError, UnrefinableError
 from service.meshfiles import formats
-from service.meshfiles.counted import count_triangles
 from service.meshfiles.mesh_file import MATERIAL, UV
 from service.meshfiles.obj import read_obj, write_obj
 from service.meshfiles.parts import chosen_of
@@ -135,17 +134,7 @@ def test_corners_that_name_what_is_not_there_are_reported():
 
 def test_an_off_may_begin_with_a_mark_of_its_encoding():
     data = b"\xef\xbb\xbfOFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
-    assert len(formats.read(data, "off").faces) == count_triangles(data, "off") == 1
-
-
-def test_faces_behind_blanks_are_counted():
-    assert count_triangles((POSITIONS + "f 1 2 3\n\t F 1 2 3 4\n").encode(), "obj") == 3
-
-
-def test_words_of_comments_are_no_corners():
-    text = POSITIONS + "f 1 2 3 # of a lid, seen from above\n# f 1 2 3 4 5 6\nf 1 2 3 4#5 6\n"
-    assert count_triangles(text.encode(), "obj") == 3
-    assert count_triangles(text.replace("\n", "\r").encode(), "obj") == 3
+    assert len(formats.read(data, "off").faces) == 1
 
 
 def test_an_object_is_named_before_its_vertices():

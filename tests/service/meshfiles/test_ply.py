@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from service.errors import UnreadableError
-from service.meshfiles.counted import count_triangles
 from service.meshfiles.formats import read, write
 from service.meshfiles.mesh_file import COLOUR, NORMAL, UV, MeshFile
 from service.meshfiles.ply import ply_header, read_ply
@@ -137,10 +136,6 @@ def test_normals_colours_and_double_positions_come_back_in_their_types() -> None
     assert again.layers[COLOUR].values.dtype == np.uint8
     assert again.layers[COLOUR].values[0].tolist() == [255, 128, 0, 64]
     assert again.layers[NORMAL].values[0].tolist() == [0, 0, 1]
-
-
-def test_triangles_are_counted_by_the_header() -> None:
-    assert count_triangles(ply("<"), "ply") == count_triangles(ply(""), "ply") == len(FANS)
 
 
 def test_faces_of_more_corners_than_a_byte_counts_are_written_whole() -> None:

@@ -295,7 +295,6 @@ def test_smooth_uvs_of_quads_follow_the_positions_and_their_creases(crease: str)
     for quad in QUADS:
         text += "f " + " ".join(f"{v + 1}/{v + 1}" for v in quad) + "\n"
     options = {"scheme": "catmull-clark", "uv": "smooth", "crease": crease, "levels": 3}
-    options["limit"] = False
     mesh = formats.read_polygons(made(text.encode(), "obj", "obj", **options).content, "obj")
     uv = mesh.layers[UV].values[mesh.layers[UV].rows]
     np.testing.assert_allclose(uv, mesh.vertices[mesh.corners][:, 1:], atol=1e-9)

@@ -55,7 +55,7 @@ def test_flat_shading_goes_where_no_edge_is_to_stay_sharp(scheme):
 
 def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
     shape = octahedron()
-    triangles, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth", limit=False)
+    triangles, _ = refined(shape, shape["POSITION"][:, :2], levels=2, uv="smooth")
     np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, :2], atol=1e-12)
 
 
@@ -63,13 +63,7 @@ def test_smooth_uvs_follow_the_positions_of_a_closed_chart():
 def test_smooth_uvs_have_the_creases_of_the_positions(crease):
     shape = box()
     triangles, _ = refined(
-        shape,
-        shape["POSITION"][:, 1:],
-        levels=3,
-        uv="smooth",
-        crease=crease,
-        scheme=ASKING,
-        limit=False,
+        shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease, scheme=ASKING
     )
     np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, 1:], atol=1e-12)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from service.meshfiles.mesh_file import MeshFile, offsets_of
-from service.meshfiles.triangulate import triangulated
+from service.meshfiles.triangulate import cut_polygons, triangulated
 
 
 def cut(points: list, *polygons: list[int]) -> MeshFile:
@@ -108,3 +108,18 @@ def test_a_polygon_that_crosses_itself_is_reported() -> None:
     mesh = cut([(0, 0), (1, 1), (1, 0), (0, 1)], [0, 1, 2, 3])
     assert len(mesh.faces) == 2
     assert any("cross themselves" in change.what for change in mesh.changes)
+
+
+def test_a_whisker_of_thousands_of_corners_is_cut_like_any_polygon() -> None:
+    """Each corner of it lies on a straight side: all belong to triangles that have an area."""
+    count = 8_000
+    side = np.stack([np.linspace(0, 1, count), np.zeros(count)], axis=1)
+    points = np.concatenate([side, [[1.0, 1.0], [0.5, 0.25], [0.0, 1.0]]])
+    vertices = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
+    cut = cut_polygons(vertices, np.array([0, len(points)]), np.arange(len(points)))
+    a, b, c = (points[cut.places[:, corner]] for corner in range(3))
+    (x, y), (u, v) = (b - a).T, (c - a).T
+    areas = (x * v - y * u) / 2
+    assert len(cut.places) == len(points) - 2
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(0.625)

@@ -15,8 +15,7 @@ from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.errors import InvalidParameter, NoModelError
 from service.http.answer import is_known
-from service.workers.catalogue import Catalogue, ModelEntry, catalogue_of
-from service.workers.models import Models
+from service.workers.models import Catalogue, ModelEntry, Models, catalogue_of
 from tests.support.packages import served_file, several_models
 from tests.support.stand_in_models import ZeroModel
 

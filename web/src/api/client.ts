@@ -1,6 +1,6 @@
 /** Requests to the service, relative to where the page itself came from. */
 
-import { isAbort, localProblem, problemOf } from "./problem";
+import { isAbort, localProblem, Problem, problemOf } from "./problem";
 
 export interface Limits {
   body_bytes: number;
@@ -36,6 +36,13 @@ export function address(path: string): string {
   return new URL(path.replace(/^\//, ""), new URL("..", import.meta.url)).href;
 }
 
+/** A connection that broke: another try may do. */
+export class Broken extends Problem {
+  constructor(title: string, detail: string) {
+    super({ title, detail, status: 0 });
+  }
+}
+
 /** Fetch a route; anything but success throws the Problem that the service describes. */
 export async function request(path: string, init: RequestInit = {}): Promise<Response> {
   const sent = { ...init, headers: headers(init.headers as Record<string, string>) };
@@ -44,7 +51,7 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
     response = await fetch(address(path), sent);
   } catch (error) {
     if (init.signal?.aborted) throw error;
-    throw localProblem("The service does not answer", "Is it running, and the network up?");
+    throw new Broken("The service does not answer", "Is it running, and the network up?");
   }
   if (!response.ok) throw problemOf(response.status, await response.text());
   return response;
@@ -59,7 +66,7 @@ export async function* pieces(response: Response, nothing: string): AsyncGenerat
     for (let next = await reader.read(); !next.done; next = await reader.read()) yield next.value;
   } catch (error) {
     if (isAbort(error)) throw error;
-    throw localProblem("The connection broke", "Is the service running, and the network up?");
+    throw new Broken("The connection broke", "Is the service running, and the network up?");
   } finally {
     // Nobody may want the rest.
     void reader.cancel().catch(() => {});

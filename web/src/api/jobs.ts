@@ -1,9 +1,9 @@
-/** One refinement: upload, queue, stages, download. A signal cancels each of them. */
+/** One refinement: upload, queue, stages, download, all of one request. A signal cancels each of them. */
 
-import { address, headers, pieces, request } from "./client";
-import { events } from "./events";
+import { Broken, pieces, request } from "./client";
 import { gzipped } from "./gzip";
-import { localProblem, Problem, problemOf, type ProblemDocument } from "./problem";
+import { Cut, parts } from "./multipart";
+import { localProblem, Problem, type ProblemDocument } from "./problem";
 
 export interface Body {
   content: Blob | FormData;
@@ -20,8 +20,8 @@ export interface Progress {
   /** Before this job in the queue; only while queued. */
   place?: number | null;
   stage?: string | null;
-  /** Seconds that the service expects the job to take in all. */
-  estimate?: number | null;
+  /** The connection broke, and this is the second try. */
+  again?: boolean;
 }
 
 export interface Answer {
@@ -30,139 +30,85 @@ export interface Answer {
   timings: [string, number][];
 }
 
-interface Job {
-  id: string;
-  state: "queued" | "running" | "done" | "failed" | "cancelled";
-  queue_place: number | null;
+interface Told {
+  state: "queued" | "running";
+  place: number | null;
   stage: string | null;
-  share: number | null;
-  estimate_seconds?: number | null;
-  problem?: ProblemDocument | null;
+  share: number;
 }
 
+/** Before the second try: a proxy finds another replica meanwhile. */
+const PAUSE_MS = 1000;
+
+/** Refine a file. Where the connection breaks it is tried once more: nothing is kept for another to fetch. */
 export async function refine(
   body: Body,
   query: URLSearchParams,
   signal: AbortSignal,
   tell: (progress: Progress) => void,
 ): Promise<Answer> {
-  const location = await upload(`jobs?${query}`, body, signal, tell);
   try {
-    await finished(location, signal, tell);
-    return await download(location, signal, tell);
-  } finally {
-    // Free the worker at once where the job was cancelled, and the result's memory otherwise.
-    void request(location, { method: "DELETE", keepalive: true }).catch(() => {});
+    return await attempt(body, query, signal, tell);
+  } catch (error) {
+    if (!isBroken(error) || signal.aborted) throw error;
+    await readable(body);
+    tell({ step: "upload", share: null, again: true });
+    await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+    signal.throwIfAborted();
+    try {
+      return await attempt(body, query, signal, (progress) => tell({ ...progress, again: true }));
+    } catch (second) {
+      if (!isBroken(second) || signal.aborted) throw second;
+      throw localProblem("The connection broke twice", "Is the service running, and the network up?");
+    }
   }
 }
 
-/** Send the body. By XMLHttpRequest: fetch does not report how much of a body has gone out. */
-async function upload(
-  path: string,
+function isBroken(error: unknown): boolean {
+  return error instanceof Broken || error instanceof Cut || (error instanceof Problem && error.status === 502);
+}
+
+async function attempt(
   body: Body,
+  query: URLSearchParams,
   signal: AbortSignal,
   tell: (progress: Progress) => void,
-): Promise<string> {
-  tell({ step: "upload", share: 0 });
+): Promise<Answer> {
+  tell({ step: "upload", share: null });
   const packed = await gzipped(body);
-  return new Promise((resolve, reject) => {
-    const sent = new XMLHttpRequest();
-    sent.open("POST", address(path));
-    for (const [name, value] of Object.entries(headers())) sent.setRequestHeader(name, value);
-    if (body.type) sent.setRequestHeader("Content-Type", body.type);
-    if (packed) sent.setRequestHeader("Content-Encoding", "gzip");
-    sent.upload.onprogress = (event) =>
-      tell({ step: "upload", share: event.lengthComputable ? event.loaded / event.total : null });
-    sent.onload = () => {
-      if (sent.status !== 202) return reject(problemOf(sent.status, sent.responseText));
-      try {
-        resolve(`jobs/${(JSON.parse(sent.responseText) as Job).id}`);
-      } catch {
-        // A proxy answered in the service's place.
-        reject(problemOf(sent.status, sent.responseText));
-      }
-    };
-    sent.onerror = () => {
-      const broken = localProblem("The upload did not arrive", "The connection to the service broke.");
-      // The file may have been deleted meanwhile: that has words of its own.
-      readable(body).then(() => reject(broken), reject);
-    };
-    sent.onabort = () => reject(new DOMException("cancelled", "AbortError"));
-    signal.addEventListener("abort", () => sent.abort());
-    if (signal.aborted) return reject(new DOMException("cancelled", "AbortError"));
-    sent.send(packed ?? body.content);
-  });
+  const headers: Record<string, string> = { Accept: "multipart/mixed" };
+  if (body.type) headers["Content-Type"] = body.type;
+  if (packed) headers["Content-Encoding"] = "gzip";
+  const sent = { method: "POST", body: packed ?? body.content, headers, signal };
+  const response = await request(`subdivide?${query}`, sent);
+  const type = response.headers.get("Content-Type") ?? "";
+  let answer: Answer | null = null;
+  const received = (bytes: number, total: number): void => tell({ step: "download", share: bytes / total });
+  for await (const part of parts(pieces(response, "No result came"), type, received)) {
+    if (part.name === "progress") tell(progressOf(json<Told>(part.bytes)));
+    if (part.name === "problem") throw new Problem(json<ProblemDocument>(part.bytes));
+    if (part.name === "file") {
+      answer = { bytes: part.bytes, timings: timings(part.headers.get("server-timing") ?? "") };
+    }
+  }
+  if (!answer) throw new Cut("no file came");
+  return answer;
+}
+
+function progressOf({ state, place, stage, share }: Told): Progress {
+  return state === "queued" ? { step: "queue", share: null, place } : { step: "refine", share, stage };
+}
+
+function json<T>(bytes: ArrayBuffer): T {
+  return JSON.parse(new TextDecoder().decode(bytes)) as T;
 }
 
 /** Read a byte of each file of a body. Rejects where one has changed since it was chosen. */
 async function readable({ content }: Body): Promise<void> {
-  const parts = content instanceof Blob ? [content] : content.values();
-  for (const part of parts) if (part instanceof Blob) await part.slice(0, 1).arrayBuffer();
-}
-
-/** Follow the job's events to its end. */
-async function finished(
-  location: string,
-  signal: AbortSignal,
-  tell: (progress: Progress) => void,
-): Promise<void> {
-  const response = await request(`${location}/events`, { signal });
-  for await (const { event, data } of events(pieces(response, "No progress came"))) {
-    if (event !== "progress") continue;
-    const job = JSON.parse(data) as Job;
-    if (job.state === "done") return;
-    if (hasEnded(job)) throw failure(job);
-    tell({
-      step: job.state === "queued" ? "queue" : "refine",
-      share: job.state === "queued" ? null : job.share,
-      place: job.queue_place,
-      stage: job.stage,
-      estimate: job.estimate_seconds ?? null,
-    });
-  }
-  // A proxy may cut a long stream: the job's own state decides.
-  const job = (await (await request(location, { signal })).json()) as Job;
-  if (hasEnded(job)) throw failure(job);
-  if (job.state !== "done") return finished(location, signal, tell);
-}
-
-function hasEnded({ state }: Job): boolean {
-  return state === "failed" || state === "cancelled";
-}
-
-/** Say why a job ended without a result. The service itself may have cancelled it. */
-function failure({ state, problem }: Job): Problem {
-  if (problem) return new Problem(problem);
-  return state === "cancelled"
-    ? localProblem("The service ended the job", "It may be stopping, or starting anew.")
-    : localProblem("The job failed", "The service gave no reason.");
-}
-
-async function download(
-  location: string,
-  signal: AbortSignal,
-  tell: (progress: Progress) => void,
-): Promise<Answer> {
-  const response = await request(`${location}/result`, {
-    signal,
-    // Its format was asked for with the job; a report is the other answer.
-    headers: { Accept: "model/*" },
-  });
-  const total = Number(response.headers.get("Content-Length")) || null;
-  const held: Uint8Array[] = [];
-  let received = 0;
-  for await (const piece of pieces(response, "No result came")) {
-    held.push(piece);
-    received += piece.length;
-    tell({ step: "download", share: total ? received / total : null });
-  }
-  const bytes = await new Blob(held as BlobPart[]).arrayBuffer();
-  return { bytes, timings: timings(response.headers.get("Server-Timing") ?? "") };
+  const files = content instanceof Blob ? [content] : content.values();
+  for (const file of files) if (file instanceof Blob) await file.slice(0, 1).arrayBuffer();
 }
 
 function timings(header: string): [string, number][] {
-  return [...header.matchAll(/([\w-]+);dur=([\d.]+)/g)].map(([, name, ms]) => [
-    name as string,
-    Number(ms),
-  ]);
+  return [...header.matchAll(/([\w-]+);dur=([\d.]+)/g)].map(([, name, ms]) => [name as string, Number(ms)]);
 }

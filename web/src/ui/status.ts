@@ -3,7 +3,7 @@
 import { useKey } from "../api/client";
 import type { Progress } from "../api/jobs";
 import { problemFrom } from "../api/problem";
-import { percent, seconds } from "../report/format";
+import { percent } from "../report/format";
 import { element, input } from "./dom";
 
 const STAGES: Record<string, string> = {
@@ -14,7 +14,11 @@ const STAGES: Record<string, string> = {
   write: "Writing",
 };
 
-export function sentence({ step, share, place, stage, estimate }: Progress): string {
+export function sentence(progress: Progress): string {
+  return `${progress.again ? "The connection broke, trying once more: " : ""}${stepOf(progress)}`;
+}
+
+function stepOf({ step, share, place, stage }: Progress): string {
   const done = share === null ? "" : ` ${Math.round(100 * share)} %`;
   switch (step) {
     case "open":
@@ -24,7 +28,7 @@ export function sentence({ step, share, place, stage, estimate }: Progress): str
     case "queue":
       return place ? `Waiting, number ${place} in line` : "Waiting for a worker";
     case "refine":
-      return `${STAGES[stage ?? ""] ?? "Refining"}${done}${estimate && estimate > 2 ? `, about ${seconds(estimate)}` : ""}`;
+      return `${STAGES[stage ?? ""] ?? "Refining"}${done}`;
     case "download":
       return `Downloading${done}`;
   }
@@ -91,8 +95,8 @@ export function showProblem(error: unknown, file = ""): void {
   element("problem-pointer").textContent = place;
   element("problem-pointer").hidden = !place;
   element("key-form").hidden = problem?.status !== 401;
-  // The service is busy, slow or gone, or has lost the job: the same may work in a moment.
-  element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 404, 408, 409, 429].includes(problem.status));
+  // The service is busy, slow or gone: the same may work in a moment.
+  element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 408, 429].includes(problem.status));
   element("problem").hidden = false;
   document.body.classList.remove("folded");
   element("problem").scrollIntoView({ block: "nearest" });

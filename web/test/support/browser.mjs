@@ -82,7 +82,7 @@ export async function settled(page) {
 export async function hold(page, held = () => true) {
   let release;
   const released = new Promise((resolve) => (release = resolve));
-  await page.route(/\/jobs\?/, async (route) => {
+  await page.route(/\/subdivide\?/, async (route) => {
     const request = route.request();
     if (held(bodyOf(request), request.url())) await released;
     // The page may have ended it meanwhile.

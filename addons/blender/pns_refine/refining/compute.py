@@ -9,24 +9,36 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Creases, Scheme, loop, pns, sharp_edges
+from pns_common.carry import rules
+from pns_common.carry.carried import (
+    Carrier,
+    Column,
+    edge_parents,
+    refine_column,
+    scaled_to_unit,
+)
+from pns_common.carry.charts import Linear
 from pns_common.mesh.creases import NO_CREASES
 from pns_common.mesh.topology import EdgeClass, Topology
 from pns_common.model.file import COMPANIONS, companion_of
 from pns_common.model.session import Model
 from pns_common.operator.scheme import named_scheme
 from pns_common.parallel import Blocks, available_threads
-from pns_common.schemes.limit import limit_positions
 
-from .corners import refine_corners
-from .edges import edge_parents
 from .hidden import hide_within
 from .positions import Positions, refine_positions
 from .shown_creases import shown_creases
 from .snapshot import Control, Faces, Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
-from .steps import Steps, edge_numbers, level_steps, refine_columns, straight_level
-from .votes import vote_at_corners, vote_at_points
+from .steps import Steps, edge_numbers, level_steps, refine_columns
 from .watched import WatchedModel
 
+# What stays linear of a UV map, by Blender's names and by ours.
+KEPT: dict[Smoothing, Linear] = {
+    Smoothing.NONE: "all",
+    Smoothing.PRESERVE_CORNERS: "corners only",
+    Smoothing.PRESERVE_BOUNDARIES: "boundaries",
+    Smoothing.SMOOTH_ALL: "none",
+}
 # How much of the work the positions are; the base scheme's own are needed for the distance.
 SHARES = {"positions": 0.6, "base": 0.15, "columns": 0.15, "corners": 0.1}
 
@@ -83,18 +95,17 @@ def compute(
 
     offsets = snapshot.offsets
     moved = np.concatenate([snapshot.groups, *offsets], axis=1)
-    columns = refine_columns(moved, steps)
+    columns = refine_columns(moved, steps, limit=choice.limit)
     bar.reach("columns")
     group_count = snapshot.groups.shape[1]
     moves = columns[:, group_count:]
-    if choice.limit:
-        at_last = steps.at_last, Blocks(available_threads()), base
-        moves = limit_positions(moves, *at_last) if moves.shape[1] else moves
 
-    faces = _faces(control, steps)
+    topologies = [step.topology for step in steps.steps]
+    carrier = Carrier(topologies, base, choice.limit, Blocks(available_threads()))
+    faces = _faces(control, steps, carrier)
     loose = np.flatnonzero(~snapshot.edge_used)
-    own_edge = np.r_[edge_parents(steps, snapshot), loose]
-    carry = _Carry(snapshot, control, choice, steps, faces, own_edge)
+    own_edge = np.r_[_edge_parents(steps, snapshot), loose]
+    carry = _Carry(control, choice, steps, carrier, own_edge)
     layers = []
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
@@ -191,22 +202,32 @@ def _distance_from_base(
 
 def _at_later(values: Float[np.ndarray, " L"], steps: Steps) -> Float[np.ndarray, " W"]:
     """Carry values from the vertices of a level to the last; new ones have a mean."""
-    for step in steps.steps:
-        if step.topology.vertex_count == len(values):
-            values = straight_level(values[:, None], step.topology, steps.base)[:, 0]
-    return values
+    counts = [step.topology.vertex_count for step in steps.steps]
+    if len(values) not in counts:
+        return values
+    later = [step.topology for step in steps.steps[counts.index(len(values)) :]]
+    return refine_column(Column(values), later, steps.base)
 
 
-def _faces(control: Control, steps: Steps) -> Faces:
-    final, children = steps.final, 4 ** len(steps.steps)
-    if steps.base.polygons:
-        children = np.diff(control.mesh.offsets) * (children // 4)
+def _faces(control: Control, steps: Steps, carrier: Carrier) -> Faces:
+    final = steps.final
     return Faces(
         starts=final.offsets.astype(np.int64),
         vertices=final.corners.astype(np.int64),
         edges=final.corner_edges.astype(np.int64),
-        parents=np.repeat(control.polygons, children),
+        parents=control.polygons[carrier.face_parents],
     )
+
+
+def _edge_parents(steps: Steps, snapshot: Snapshot) -> Int[np.ndarray, " E"]:
+    """Return the mesh's own edge that each final edge is a piece of; −1 for edges inside faces."""
+    first = steps.steps[0].topology
+    parents = np.full(len(first.edges), -1, dtype=np.int64)
+    # Diagonals that cut polygons into triangles are no edges of the mesh.
+    numbers = edge_numbers(first, snapshot.edges)
+    own = np.flatnonzero(numbers >= 0)
+    parents[numbers[own]] = own
+    return edge_parents([step.topology for step in steps.steps], steps.final, parents)
 
 
 def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
@@ -221,26 +242,22 @@ def _final_crease_sharpness(steps: Steps) -> Float[np.ndarray, " E"]:
 class _Carry:
     """Carry a layer's values to the new points, edges, faces or corners."""
 
-    snapshot: Snapshot
     control: Control
     choice: Choice
     steps: Steps
-    faces: Faces
+    carrier: Carrier
     edge_parent: Int[np.ndarray, " E"]
 
     def __call__(self, layer: Layer) -> np.ndarray:
-        values = getattr(self, f"_{layer.domain.name.lower()}")(layer)
-        return _unit(values) if layer.unit else values
+        values: np.ndarray = getattr(self, f"_{layer.domain.name.lower()}")(layer)
+        return values
 
     def _point(self, layer: Layer) -> np.ndarray:
         if layer.rule is Rule.BLEND:
-            return refine_columns(layer.values, self.steps)
-        if layer.rule is Rule.VOTE:
-            return vote_at_points(layer.values, self.steps)
-        count = self.steps.final.vertex_count
-        kept = np.zeros((count, layer.values.shape[1]), dtype=layer.values.dtype)
-        kept[: len(layer.values)] = layer.values
-        return kept
+            values = refine_columns(layer.values, self.steps, limit=self.choice.limit)
+            return scaled_to_unit(values) if layer.unit else values
+        rule = rules.vote if layer.rule is Rule.VOTE else rules.old
+        return self.carrier.at_vertices(Column(layer.values, rule))
 
     def _edge(self, layer: Layer) -> np.ndarray:
         if len(layer.values) == 0:
@@ -250,27 +267,16 @@ class _Carry:
         return np.where(known[:, None], values, np.zeros_like(values))
 
     def _face(self, layer: Layer) -> np.ndarray:
-        return layer.values[self.faces.parents]
+        return layer.values[self.control.polygons][self.carrier.face_parents]
 
     def _corner(self, layer: Layer) -> np.ndarray:
         values = layer.values[self.control.corners]
-        if layer.rule is Rule.BLEND:
-            # Directions are stored roughly: what differs by less than that is no seam.
-            same = np.round(values, 3) if layer.unit else None
-            creases, sharp = self.steps.steps[0].creases, self.snapshot.vertex_sharpness
-            uv = layer.kind == "FLOAT2"
-            smoothing = self.choice.uv_smooth if uv else Smoothing.PRESERVE_BOUNDARIES
-            mesh, levels = self.control.mesh, self.choice.levels
-            faces = mesh.corners, mesh.offsets
-            asked = faces, self.steps.base, levels, creases, sharp, same, smoothing
-            return refine_corners(values, *asked)
-        return vote_at_corners(values, self.steps.base, self.choice.levels)
-
-
-def _unit(values: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N K"]:
-    """Scale rows to length 1; a row without length stays."""
-    length = np.linalg.norm(values, axis=1, keepdims=True)
-    return values / np.where(length > 0, length, 1)
+        if layer.rule is not Rule.BLEND:
+            return self.carrier.at_corners(Column(values, rules.nearest))
+        # Directions are stored roughly: what differs by less than that is no seam.
+        same = np.round(values, 3) if layer.unit else None
+        keep = KEPT[self.choice.uv_smooth] if layer.kind == "FLOAT2" else "boundaries"
+        return self.carrier.at_corners(Column(values, rules.smooth, keep, layer.unit, same))
 
 
 class _Bar:

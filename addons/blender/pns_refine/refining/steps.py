@@ -17,6 +17,7 @@ from pns_common.mesh.creases import NO_CREASES, Creases
 from pns_common.mesh.topology import Topology, halves_of
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import BaseScheme
+from pns_common.schemes.limit import limit_positions
 
 from .snapshot import edge_keys
 
@@ -118,16 +119,19 @@ def level_steps(
     return Steps(base, tuple(steps), plain, pairs, crease_sharpness)
 
 
-def refine_columns(columns: Float[np.ndarray, "V K"], steps: Steps) -> Float[np.ndarray, "W K"]:
-    """Refine columns by the scheme's masks, level by level."""
+def refine_columns(
+    columns: Float[np.ndarray, "V K"], steps: Steps, *, limit: bool = False
+) -> Float[np.ndarray, "W K"]:
+    """Refine columns by the scheme's masks, level by level; ``limit``: and its limit masks."""
     if columns.shape[1] == 0:
         return np.zeros((steps.final.vertex_count, 0))
+    base, blocks = steps.base, Blocks(available_threads())
     for step in steps.steps:
-        columns, given = one_level(columns, step.topology, steps.base), columns
+        columns, given = base.place(columns, step.topology, blocks), columns
         if step.mixture is not None:
-            sharp = one_level(given, step.mixture.topology, steps.base)
+            sharp = base.place(given, step.mixture.topology, blocks)
             columns = step.mixture.of(columns, sharp)
-    return columns
+    return limit_positions(columns, steps.at_last, blocks, base) if limit else columns
 
 
 def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, " N"]:
@@ -145,24 +149,6 @@ def edge_numbers(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Int[np.nd
 def with_creases(topology: Topology, pairs: Int[np.ndarray, "N 2"]) -> Topology:
     """Return the topology with the edges that pairs of vertices name as creases."""
     return topology.with_creases(topology.rows_of(pairs)) if len(pairs) else topology
-
-
-def one_level(
-    columns: Float[np.ndarray, "V K"], topology: Topology, base: BaseScheme
-) -> Float[np.ndarray, "W K"]:
-    """Refine columns by one level of a scheme's masks."""
-    return base.place(columns, topology, Blocks(available_threads()))
-
-
-def straight_level(
-    columns: Float[np.ndarray, "V K"], topology: Topology, base: BaseScheme
-) -> Float[np.ndarray, "W K"]:
-    """Let old vertices keep their columns; those of edges and of faces have the mean."""
-    made = [columns, columns[topology.edges].mean(axis=1)]
-    if base.polygons:
-        starts, sizes = topology.offsets[:-1], np.diff(topology.offsets)
-        made.append(np.add.reduceat(columns[topology.corners], starts) / sizes[:, None])
-    return np.concatenate(made)
 
 
 def _halves(soft: Creases, topology: Topology, base: BaseScheme) -> Creases:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.model.card import ModelCard
-from pns_common.model.session import Model, PolygonModel
+from pns_common.model.session import DirectedModel, Model, PolygonModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class WatchedModel:
     def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
         """Return the answers of a network of directed edges."""
         self.look_up()
-        return self.model.run(given, rows)
+        return cast(DirectedModel, self.model).run(given, rows)
 
     def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
         """Return the sharpness of a block of edges."""

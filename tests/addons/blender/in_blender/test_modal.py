@@ -15,7 +15,7 @@ class Large(operator.Refining):
 
     def __init__(self, **settings):
         self.levels, self.scheme, self.model, self.model_file = 2, "PNS", "general", ""
-        self.budget, self.limit, self.crease_angle, self.border = 0.5, False, 10.0, "ALL"
+        self.budget, self.limit, self.crease_angle, self.border = 0.5, True, 10.0, "ALL"
         self.crease_lines, self.keep_original, self.beside = True, True, True
         self.uv_smooth = "PRESERVE_BOUNDARIES"
         self.said = []

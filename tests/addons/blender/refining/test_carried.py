@@ -7,9 +7,8 @@ import pytest
 
 from addons.blender.pns_refine.refining.compute import SHARES, Choice, compute
 from addons.blender.pns_refine.refining.snapshot import Domain, Layer, Rule, Smoothing
-from pns_common import Mesh, load_model, loop
+from pns_common import Mesh, load_model, loop, refine
 from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, cut, grid, snapshot
-from tests.support.control_points import refine
 
 
 def carried(shape, domain, rule, values, levels=1, *, quads=False):

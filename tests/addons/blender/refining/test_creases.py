@@ -24,7 +24,7 @@ from tests.support.control_points import refine
 
 
 def points(snapshot, levels=1, **choice):
-    return compute(snapshot, Choice(None, levels, **choice)).points
+    return compute(snapshot, Choice(None, levels, **{"limit": False, **choice})).points
 
 
 @given(st.floats(0, 1))
@@ -39,7 +39,7 @@ def test_without_creases_it_is_the_operator(model):
     whole, shape, model = model == DEFAULT_MODEL, grid(4), model and load_model(model)
     scheme, mesh = pns(model) if model else loop(), shape.control(whole=whole).mesh
     expected = refine(mesh, scheme, 2, creases=None)
-    computed = compute(shape, Choice(model, 2, crease_lines=False))
+    computed = compute(shape, Choice(model, 2, crease_lines=False, limit=False))
     np.testing.assert_array_equal(computed.points, expected.mesh.vertices)
     assert computed.report == expected.report
     learned = scheme.learned_levels
@@ -87,7 +87,7 @@ def test_columns_go_through_the_same_masks_as_positions(base):
         shape = cube(crease_sharpness)
         control = shape.control(whole=base.polygons).mesh.topology()
         steps = level_steps(control, base, 2, shape.edges, shape.crease_sharpness)
-        made = compute(shape, Choice(model, 2, budget=0.0)).points
+        made = compute(shape, Choice(model, 2, budget=0.0, limit=False)).points
         np.testing.assert_allclose(refine_columns(shape.points, steps), made, atol=1e-14)
 
 
@@ -113,7 +113,7 @@ def test_sharp_vertices_are_the_librarys_and_wear_off(whole, crease_sharpness):
     shape, sharpness = cube(), [1.5, np.inf, 2.25]
     shape.crease_sharpness[:4], shape.vertex_sharpness[:3] = crease_sharpness, sharpness
     shape, base = (shape, catmull_clark()) if whole else (cut(shape), loop())
-    made = compute(shape, Choice(load_model(), 2, budget=0.0))
+    made = compute(shape, Choice(load_model(), 2, budget=0.0, limit=False))
     if crease_sharpness != 0.4:
         edges = shape.edges[:4] if crease_sharpness else None
         kept = Creases(edges, vertices=[0, 1, 2], vertex_sharpness=sharpness)
@@ -139,12 +139,12 @@ def test_diagonals_of_flat_quads_are_never_sharp():
 @pytest.mark.parametrize("kept", [True, False])
 def test_lines_are_kept_where_the_model_asks_for_them(kept):
     shape, model = cut(cube()), load_model(DEFAULT_MODEL)
-    deep = compute(shape, Choice(model, 3, crease_lines=kept))
+    deep = compute(shape, Choice(model, 3, crease_lines=kept, limit=False))
     assert not deep.crease_sharpness.any()
     creases = "auto" if kept else None
     expected = refine(Mesh(shape.points, shape.triangles), pns(model), 3, creases=creases)
     np.testing.assert_array_equal(deep.points, expected.mesh.vertices)
-    of_loop = compute(cube(), Choice(None, 1, crease_lines=kept))
+    of_loop = compute(cube(), Choice(None, 1, crease_lines=kept, limit=False))
     assert not (of_loop.crease_sharpness > 0).any()
 
 

@@ -125,7 +125,7 @@ def test_smooth_texture_coordinates_follow_the_surface_inside_their_chart(levels
     rng = np.random.default_rng(0)
     shape["POSITION"][:, :2] += rng.uniform(-0.2, 0.2, (25, 2))
     shape["TEXCOORD_0"] = shape["POSITION"][:, :2]
-    made = subdivide(shape, uv="smooth", levels=levels, border="fixed", limit=False)
+    made = subdivide(shape, uv="smooth", levels=levels, border="fixed")
     _, attributes = files.primitive_of(made.glb)
     np.testing.assert_allclose(attributes["TEXCOORD_0"], attributes["POSITION"][:, :2], atol=1e-6)
 

@@ -1,0 +1,193 @@
+"""The stream: how far a job is, then the file and the report, or why there is none."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from email import message_from_bytes
+from email.message import Message
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from service.http import answer as answers
+from tests.support.live import served
+
+GLB = {"Content-Type": "model/gltf-binary"}
+STREAM = GLB | {"Accept": "multipart/mixed"}
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[tuple[str, int]]:
+    with served(workers=2, queue=2, client_requests=3, job_seconds=3600) as where:
+        yield where
+
+
+@pytest.fixture
+def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
+    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=600) as opened:
+        yield opened
+
+
+def parts_of(answer: httpx2.Response) -> list[Message]:
+    """The parts, as Python's own reader of MIME finds them."""
+    assert answer.status_code == 200
+    head = f"Content-Type: {answer.headers['content-type']}\r\n\r\n".encode()
+    message = message_from_bytes(head + answer.content)
+    assert message.is_multipart()
+    assert message.defects == []
+    return message.get_payload()  # pyright: ignore
+
+
+def named(parts: list[Message], name: str) -> list[bytes]:
+    return [
+        part.get_payload(decode=True)  # pyright: ignore
+        for part in parts
+        if part["Content-Description"] == name
+    ]
+
+
+def until(holds: Callable[[], bool]) -> None:
+    while not holds():
+        time.sleep(0.005)
+
+
+def begin(address: tuple[str, int], body: bytes) -> socket.socket:
+    connection = socket.create_connection(address, timeout=600)
+    connection.sendall(
+        b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
+        b"Accept: multipart/mixed\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+    )
+    return connection
+
+
+def test_the_file_and_the_report_come_last(client: httpx2.Client) -> None:
+    parts = parts_of(client.post("/subdivide", content=b"echo", headers=STREAM))
+    *progress, file, report = parts
+    assert {part["Content-Description"] for part in progress} == {"progress"}
+    assert [part["Content-Description"] for part in (file, report)] == ["file", "report"]
+    assert file.get_payload(decode=True) == report.get_payload(decode=True) == b"echo"
+    assert file["Content-Length"] == "4"
+    assert "refine;dur=2.0" in file["Server-Timing"]
+
+
+def test_a_job_that_fails_ends_with_its_problem(client: httpx2.Client) -> None:
+    headers = STREAM | {"X-Request-ID": "mine"}
+    for body, status, code in (
+        (b"broken", 422, "invalid-gltf"),
+        (b"fault", 500, "internal-error"),
+        (b"die", 503, "worker-died"),
+    ):
+        parts = parts_of(client.post("/subdivide", content=body, headers=headers))
+        (problem,) = map(json.loads, named(parts, "problem"))
+        assert parts[-1].get_content_type() == "application/problem+json"
+        assert (problem["status"], problem["code"]) == (status, code)
+        assert problem["request_id"] == "mine"
+        assert b"secret" not in named(parts, "problem")[0]
+
+
+def test_what_is_refused_before_its_job_is_no_stream(client: httpx2.Client) -> None:
+    answer = client.post("/subdivide?levels=9", content=b"echo", headers=STREAM)
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_its_share_and_stage_are_told_as_it_goes_on(client: httpx2.Client, tmp_path: Path) -> None:
+    seen: list[dict[str, object]] = []
+    body = f"steps {tmp_path}".encode()
+    with client.stream("POST", "/subdivide", content=body, headers=STREAM) as answer:
+        for line in answer.iter_lines():
+            if line.startswith("{"):
+                seen.append(json.loads(line))
+                (tmp_path / f"go-{round(4 * float(str(seen[-1]['share'])))}").touch()
+    assert [view["share"] for view in seen if view["share"]] == [0.25, 0.5, 0.75]
+    assert seen[-1] == {"state": "running", "place": None, "stage": "refine", "share": 0.75}
+
+
+def test_a_stream_is_never_silent_for_long(
+    client: httpx2.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A proxy ends a connection on which nothing moves."""
+    monkeypatch.setattr(answers, "LOOK_SECONDS", 0.02)
+    monkeypatch.setattr(answers, "SILENT_SECONDS", 0.1)
+    same = 0
+    body = f"steps {tmp_path}".encode()
+    with client.stream("POST", "/subdivide", content=body, headers=STREAM) as answer:
+        for line in answer.iter_lines():
+            same += '"share":0.25' in line
+            if same == 3:
+                for number in (1, 2, 3):
+                    (tmp_path / f"go-{number}").touch()
+    assert same >= 3
+
+
+def test_one_that_waits_is_told_its_place(
+    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
+) -> None:
+    """One client runs one job where there are two workers."""
+    with begin(address, f"steps {tmp_path}".encode()):
+        until((tmp_path / "took-1").exists)
+        with client.stream("POST", "/subdivide", content=b"next", headers=STREAM) as answer:
+            first = next(line for line in answer.iter_lines() if line.startswith("{"))
+            assert json.loads(first) == {
+                "state": "queued",
+                "place": 0,
+                "stage": None,
+                "share": 0.0,
+            }
+            for number in (1, 2, 3):
+                (tmp_path / f"go-{number}").touch()
+
+
+def test_429_for_more_than_a_client_may_have(
+    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
+) -> None:
+    held = [begin(address, f"steps {tmp_path}".encode()) for _ in range(3)]
+    until((tmp_path / "took-1").exists)
+    until(lambda: client.post("/subdivide", content=b"x", headers=GLB).status_code == 429)
+    refused = client.post("/subdivide", content=b"x", headers=GLB)
+    assert refused.json()["code"] == "too-many-requests"
+    assert int(refused.headers["retry-after"]) >= 1
+    for connection in held:
+        connection.close()
+    until(lambda: client.post("/subdivide", content=b"x", headers=GLB).status_code == 200)
+
+
+@pytest.mark.parametrize("word", ["steps", "hold"])
+def test_who_leaves_frees_its_worker_and_memory(
+    address: tuple[str, int], client: httpx2.Client, tmp_path: Path, word: str
+) -> None:
+    """Also where its job does not look; a job may take an hour here."""
+    for number in range(3):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        with begin(address, f"{word} {folder}".encode()):
+            if word == "steps":
+                until((folder / "took-1").exists)
+    until(lambda: client.post("/subdivide", content=b"here", headers=GLB).content == b"here")
+
+
+def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(tmp_path: Path) -> None:
+    """That is how a client knows that nothing more comes."""
+    got: list[bytes] = []
+    with served(workers=1, drain_seconds=1) as where:
+        connection = begin(where, f"steps {tmp_path}".encode())
+        until((tmp_path / "took-1").exists)
+
+        def read() -> None:
+            while piece := connection.recv(4096):
+                got.append(piece)
+
+        reader = threading.Thread(target=read)
+        reader.start()
+    reader.join()
+    connection.close()
+    said = b"".join(got)
+    boundary = said.partition(b"boundary=")[2].split(b"\r\n")[0]
+    assert said.count(b"--" + boundary) >= 1
+    assert b"--" + boundary + b"--" not in said
+    assert not said.endswith(b"0\r\n\r\n")
