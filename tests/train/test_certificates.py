@@ -391,4 +391,4 @@ def test_a_network_that_sees_farther_than_it_says_is_found():
 def test_a_double_precision_twin_that_is_single_is_found():
     honest = directed_subject()
     rows = equivariance(replace(honest, exact=honest.scheme), BODIES[:1], 0)
-    assert "equivariance, double precision" in failed(rows)
+    assert "equivariance, mirrors" in failed(rows)
