@@ -355,22 +355,22 @@ def mean_leaving(
 @kernel
 def mean_in_faces(
     heights: f8_1d,
-    corners: u4_1d,
     offsets: i4_1d,
     corner_edges: u4_1d,
-    edges: u4_2d,
     begin: int,
     end: int,
     asked: f8_1d,
 ):
-    """Write the mean of ``heights`` (2 E,) over the directed edges around faces begin … end − 1."""
-    edge_count = edges.shape[0]
+    """Write the mean of ``heights`` (2 E,) over the edges around faces begin … end − 1.
+
+    Both directions count: a mirror puts the face to the left of the other one.
+    """
+    edge_count = heights.shape[0] // 2
     for f in range(max(begin, 0), end):
         total = 0.0
         for h in range(offsets[f], offsets[f + 1]):
-            e = corner_edges[h]
-            total += heights[e] if edges[e, 0] == corners[h] else heights[edge_count + e]
-        asked[f] = total / (offsets[f + 1] - offsets[f])
+            total += heights[corner_edges[h]] + heights[edge_count + corner_edges[h]]
+        asked[f] = total / (2 * (offsets[f + 1] - offsets[f]))
 
 
 @kernel

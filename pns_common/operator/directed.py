@@ -189,7 +189,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
         lambda begin, end: kernels.mean_leaving(*read, begin, end, of_vertices, vertex_logits),
     )
     faces = np.empty(mesh.face_count if len(heights) else 0)
-    around = heights, mesh.corners, mesh.offsets, mesh.corner_edges, edges
+    around = heights, mesh.offsets, mesh.corner_edges
     level.blocks.quiet().run(
         len(faces), lambda begin, end: kernels.mean_in_faces(*around, begin, end, faces)
     )

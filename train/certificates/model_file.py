@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from pns_common import pns
 from pns_common.model.card import DIRECTED_FORMAT, EDGE_FEATURES, FACE_FEATURES, VERTEX_FEATURES
-from pns_common.model.session import Model, Network, PolygonModel, networks
+from pns_common.model.session import DirectedModel, Model, Network, PolygonModel, networks
 from train.certificates.subject import Certificate
 from train.metrics.card import MEASURES
 
@@ -56,7 +56,8 @@ def sample_features(count: int) -> Float[np.ndarray, "N K"]:
 def _finite(model: Model, network: Network) -> Certificate:
     """Certify one network of directed edges: its rows are bounded, and so is no answer's length."""
     rows = np.random.default_rng(0).uniform(-WIDEST, WIDEST, (SAMPLES, network.columns))
-    wrong = int((~np.isfinite(model.run(network.given, rows)).all(axis=1)).sum())
+    answers = cast(DirectedModel, model).run(network.given, rows)
+    wrong = int((~np.isfinite(answers).all(axis=1)).sum())
     return Certificate("file", f"finite {network.answer}", wrong, 0, 0, f"of {SAMPLES} rows")
 
 

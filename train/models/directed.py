@@ -4,7 +4,7 @@ Each directed edge of the control mesh has a state of W numbers, made of its fea
 it hears its own state, that of the reverse edge, and the mean and the largest state of the edges
 that leave its first and its second vertex. The heads are linear in the last state: z of the new
 vertex and y of the vertex that the edge leaves, in the edge's frame; logits of sharpness, of the
-edge and of the vertex; over Catmull–Clark also the height of the vertex of the face to the left.
+edge and of the vertex; over Catmull–Clark also a height, whose mean around a face is its vertex's.
 
 All hidden units come in pairs that the mirror c ↔ d exchanges (``tied``), and means and largest
 values go by unit, so a mirrored mesh has the mirrored answer for any weights.
@@ -81,7 +81,11 @@ class Directed:
         return none.scatter_reduce(0, where, values, "amax", include_self=False)
 
     def mean_in_faces(self, values: Float[Tensor, "D K"]) -> Float[Tensor, "F K"]:
-        """Return the mean over the edges around each face."""
+        """Return the mean over both directions of the edges around each face.
+
+        A mirror puts the face to the left of the other direction.
+        """
+        values = (values + values[self.reverse]) / 2
         none = torch.zeros(self.faces + 1, values.shape[1], dtype=values.dtype)
         count = torch.bincount(self.left, minlength=self.faces + 1).clamp(min=1)
         return (none.index_add(0, self.left, values) / count[:, None])[: self.faces]
