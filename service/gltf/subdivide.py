@@ -1,10 +1,11 @@
-"""Refine a glTF file: bytes and options in, a GLB and its report out."""
+"""Refine a glTF file: bytes and options in; a GLB, or refined primitives, and the report out."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme, catmull_clark, named_scheme, pns
@@ -19,6 +20,7 @@ from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
 from .read.plan import BYTES_PER_FACE as BYTES_PER_FACE_OF_MESH
 from .read.references import mesh_instances
 from .read.upload import Media, Upload, read_upload
+from .refine.attributes import RefinedPrimitive
 from .refine.meshes import mostly_polygons, refined_meshes
 from .write.compression import BYTES_PER_FACE, WRITERS
 from .write.prune import VertexUse
@@ -33,6 +35,7 @@ from .write.storage import (
     storage_changes,
     withdraw_unused,
 )
+from .write.writer import Writer
 
 # Shares of a file's work: reading ends at the first, and writing the document begins at the second.
 READ, PUT_TOGETHER = 0.03, 0.95
@@ -57,6 +60,63 @@ class Subdivided:
     parents: Arrays = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """Refined primitives by mesh, for writers of other formats than glTF."""
+
+    meshes: dict[int, Sequence[RefinedPrimitive]] = field(default_factory=dict)
+
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+        """Keep the refined primitives of a mesh; return the number of their vertices."""
+        self.meshes[mesh] = refined
+        return sum(len(primitive.attributes["POSITION"]) for primitive in refined)
+
+    def repeat_mesh(self, mesh: int, first: int, refined: Sequence[RefinedPrimitive]) -> None:
+        """Keep the refined primitives of a mesh of the same geometry as an earlier one."""
+        self.meshes[mesh] = refined
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedScene:
+    """A refined glTF that is not written.
+
+    Attributes:
+        upload: the file as it was read: nodes, materials, skins.
+        meshes: its refined primitives by mesh.
+        report: the report.
+        faces_in: faces before refinement.
+    """
+
+    upload: Upload
+    meshes: dict[int, Sequence[RefinedPrimitive]]
+    report: dict[str, Any]
+    faces_in: int
+
+
+Into = TypeVar("Into", Writer, Gathered)
+
+
+@dataclass(frozen=True, eq=False)
+class _Refined(Generic[Into]):
+    """A refined glTF before anything is written."""
+
+    upload: Upload
+    into: Into
+    scheme: Scheme
+    results: Sequence[MeshResult]
+    unused: int
+    changes: list[Change]
+    parents: Arrays
+
+    def report(self, levels: int, more: Sequence[Change] = ()) -> dict[str, Any]:
+        changes = [*self.changes, *more]
+        return build_report(self.scheme, levels, self.results, self.unused, changes)
+
+    @property
+    def faces_in(self) -> int:
+        return sum(plan.faces for plan in self.upload.plans)
+
+
 def subdivide_gltf(
     data: bytes,
     media: Media,
@@ -78,6 +138,55 @@ def subdivide_gltf(
         pns_common.errors.ModelError: the model's answer is no correction.
     """
     course = Course() if course is None else course
+
+    def start(upload: Upload) -> Writer:
+        return WRITERS[options.compress].start(upload.tree, upload.buffers)
+
+    asked = options, model, limits, course, siblings
+    made = _refined(data, media, *asked, start, traced=traced)
+    upload, writer = made.upload, made.into
+    with course.stage("write", PUT_TOGETHER, 1.0):
+        withdraw_unused(upload.tree)
+        more = remove_replaced(writer, upload.spare) + writer.changes()
+        report = made.report(options.levels, more)
+        if options.diagnostics != "none":
+            put_report(upload.tree, report)
+        pieces = writer.finish()
+        glb = write_glb(encode(upload.tree), pieces, upload.container.others)
+    return Subdivided(glb, report, course.seconds, made.faces_in, made.parents)
+
+
+def refine_scene(
+    data: bytes,
+    media: Media,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course,
+    siblings: SiblingFiles = ALONE,
+) -> RefinedScene:
+    """Refine every triangle mesh of a glTF file for writers of other formats.
+
+    Arguments and errors are those of `subdivide_gltf`.
+    """
+    asked = options, model, limits, course, siblings
+    made = _refined(data, media, *asked, lambda _: Gathered(), traced=False)
+    report = made.report(options.levels)
+    return RefinedScene(made.upload, made.into.meshes, report, made.faces_in)
+
+
+def _refined(
+    data: bytes,
+    media: Media,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course,
+    siblings: SiblingFiles,
+    start: Callable[[Upload], Into],
+    *,
+    traced: bool,
+) -> _Refined[Into]:
     with course.stage("read", 0.0, READ):
         scheme = make_scheme(options, model)
         packing = BYTES_PER_FACE[options.compress]
@@ -94,7 +203,7 @@ def subdivide_gltf(
         instances = mesh_instances(upload.document)
         changes = _changes_of_container(upload, options)
         changes += upload.changes + storage_changes(upload.document, upload.plans)
-        writer = WRITERS[options.compress].start(upload.tree, upload.buffers)
+        into = start(upload)
 
     outcomes: dict[int, tuple[MeshResult, list[Change]]] = {}
     vertices = VertexUse(upload.document)
@@ -106,10 +215,10 @@ def subdivide_gltf(
     with course.part(READ, PUT_TOGETHER):
         for first in refined_meshes(upload, firsts, scheme, options, course, traced=traced):
             with course.stage("write"):
-                written = writer.replace_mesh(first.index, first.refined, course)
+                written = into.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]
                 for mesh in later:
-                    writer.repeat_mesh(mesh.index, first.index, mesh.refined)
+                    into.repeat_mesh(mesh.index, first.index, mesh.refined)
                 for mesh in (first, *later):
                     vertices.add(mesh.index, mesh.primitives, mesh.kept)
                     if traced:
@@ -131,17 +240,7 @@ def subdivide_gltf(
                     outcomes[mesh.index] = result, mesh.changes + left_out
     results, found = zip(*(outcomes[plan.mesh] for plan in upload.plans), strict=True)
     changes += chain.from_iterable(found)
-
-    with course.stage("write", PUT_TOGETHER, 1.0):
-        withdraw_unused(upload.tree)
-        changes += remove_replaced(writer, upload.spare) + writer.changes()
-        report = build_report(scheme, options.levels, results, vertices.unused(), changes)
-        if options.diagnostics != "none":
-            put_report(upload.tree, report)
-        pieces = writer.finish()
-        glb = write_glb(encode(upload.tree), pieces, upload.container.others)
-    faces_in = sum(plan.faces for plan in upload.plans)
-    return Subdivided(glb, report, course.seconds, faces_in, parents)
+    return _Refined(upload, into, scheme, results, vertices.unused(), changes, parents)
 
 
 def _name_of(mesh: dict[str, Any]) -> str | None:

@@ -27,11 +27,11 @@ from ..bodies.sibling_files import ALONE, SiblingFiles, folder_of
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, read_upload
-from ..gltf.subdivide import make_scheme, polygon_scheme, subdivide_gltf
+from ..gltf.subdivide import make_scheme, polygon_scheme, refine_scene, subdivide_gltf
 from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import MAX_LEVELS, Limits, Options
 from ..report import Change, changes_of, hint_on
-from .flatten import flatten
+from .flatten import Surface, flatten
 from .formats import FORMATS, held, read_within
 from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 # Stdin, or stdout.
 STREAM = Path("-")
+NOT_COMPRESSED = Change("", "not compressed: only a glTF is", 1)
 
 
 @dataclass(frozen=True)
@@ -228,6 +229,8 @@ def converted(
     if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
         media = cast(Media, kind)
+        if target not in GLTF_KINDS:
+            return _flattened(data, media, target, options, model, limits, course, siblings)
         done = subdivide_gltf(data, media, options, model, limits, course, siblings, traced=traced)
         written = _of_gltf(done.glb, done.report, target, limits)
         return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
@@ -238,7 +241,7 @@ def converted(
         if NORMAL not in mesh.layers and options.normals == "auto":
             options = replace(options, normals="smooth")
     elif options.compress != "none":
-        mesh = mesh.with_changes([Change("", "not compressed: only a glTF is", 1)])
+        mesh = mesh.with_changes([NOT_COMPRESSED])
         options = replace(options, compress="none")
     with course.part(0.1, 0.8):
         refined, report = refine_mesh_file(mesh, scheme, options, limits, course, traced=traced)
@@ -375,15 +378,37 @@ class Written:
 
 def _of_gltf(glb: bytes, report: dict[str, Any], target: str, limits: Limits) -> Written:
     faces = report["totals"]["faces"]
-    if target == "glb":
-        return Written(glb, report, faces, faces)
-    if target == "gltf":
-        return Written(as_gltf_json(glb, limits), report, faces, faces)
-    mesh, changes = flatten(glb, target, limits)
-    kept, lost = held(mesh, target)
+    content = as_gltf_json(glb, limits) if target == "gltf" else glb
+    return Written(content, report, faces, faces)
+
+
+def _flattened(
+    data: bytes,
+    media: Media,
+    target: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    course: Course,
+    siblings: SiblingFiles,
+) -> Written:
+    """Refine a glTF and write its scene as one mesh."""
+    changes: list[Change] = []
+    if options.compress != "none":
+        changes.append(NOT_COMPRESSED)
+    scene = refine_scene(data, media, options, model, limits, course, siblings)
+    with course.stage("write", 0.95, 1.0):
+        surfaces = {
+            mesh: [Surface.of(primitive) for primitive in refined]
+            for mesh, refined in scene.meshes.items()
+        }
+        mesh, lost = flatten(scene.upload, surfaces, target, limits)
+        kept, also_lost = held(mesh, target)
+        content = FORMATS[target].write(kept)
     # A mesh that several nodes show is there several times.
-    report = _with_changes(report, [*changes, *lost])
-    return Written(FORMATS[target].write(kept), report, len(kept.faces), len(kept.faces))
+    report = _with_changes(scene.report, [*changes, *lost, *also_lost])
+    faces = len(kept.sizes)
+    return Written(content, report, faces, faces, course.seconds, scene.faces_in)
 
 
 def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 
 from pns_common.mesh.rows import disjoint_faces, unit
 
@@ -15,11 +15,12 @@ from ..errors import GltfError, UnrefinableError, check_limit
 from ..gltf.constants import FLOAT, SURFACES, TRIANGLES
 from ..gltf.read.accessors import as_float, read
 from ..gltf.read.extensions import INSTANCING
-from ..gltf.read.primitives import TrianglePrimitive, read_primitive
+from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Document
-from ..gltf.read.upload import Upload, read_upload
+from ..gltf.read.upload import Upload
+from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.columns import read_skin_and_morph
-from ..meshes.weld import weld
+from ..meshes.weld import weld, weld_by_label
 from ..options import Limits
 from ..report import Change
 from .formats import FORMATS, Format
@@ -43,22 +44,41 @@ LOST = ("textures", "images", "animations", "skins", "cameras", "extensions")
 _COPY_ATTRIBUTES = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
 
 
-def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Change]]:
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A primitive to place.
+
+    Attributes:
+        primitive: its triangles.
+        vertex: (N,) the vertex of its mesh at each row; None: those in one place are one.
+    """
+
+    primitive: TrianglePrimitive
+    vertex: Int[np.ndarray, " N"] | None = None
+
+    @classmethod
+    def of(cls, refined: RefinedPrimitive) -> Surface:
+        """Return a refined primitive as one to place."""
+        given, targets = refined.attributes, tuple(refined.targets)
+        made = replace(refined.source, corners=refined.faces, attributes=given, targets=targets)
+        return cls(made, refined.vertex)
+
+
+def flatten(
+    upload: Upload, surfaces: Mapping[int, Sequence[Surface]], kind: str, limits: Limits
+) -> tuple[MeshFile, list[Change]]:
     """Return the default scene's triangles in the world, and what a file of `kind` is not given.
 
+    `surfaces` are those of each mesh of the scene that has some.
+
     Raises:
-        ServiceError: the file cannot be read, or its scene shows no triangles.
+        ServiceError: the scene shows no triangles, or cannot be placed.
         LimitError: the copies of its meshes have more than `max_faces`.
     """
-    upload = read_upload(glb, "glb", 0, limits)
-    primitives = {
-        mesh.mesh: [
-            read_primitive(upload.document, upload.buffers, mesh.mesh, number)
-            for number in mesh.primitives
-        ]
-        for mesh in upload.plans
+    primitives = {mesh: own for mesh, own in surfaces.items() if own}
+    faces = {
+        mesh: sum(len(each.primitive.corners) for each in own) for mesh, own in primitives.items()
     }
-    faces = {mesh.mesh: mesh.faces for mesh in upload.plans}
     worlds, hidden = _placed_nodes(upload.tree)
     shown = [
         (node, mesh)
@@ -79,7 +99,7 @@ def flatten(glb: bytes, kind: str, limits: Limits) -> tuple[MeshFile, list[Chang
             placed.append(_place(upload.tree, mesh, primitives[mesh], matrix, weights, joints))
             nodes.append(name)
     mesh_file = _joined(upload.tree, placed, nodes, FORMATS[kind])
-    names = [set(p.attributes) for _, mesh in shown for p in primitives[mesh]]
+    names = [set(s.primitive.attributes) for _, mesh in shown for s in primitives[mesh]]
     changes = _changes(upload.tree, len(placed), names, kind)
     left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
     for what, count in (
@@ -221,18 +241,23 @@ def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
 def _place(
     tree: dict[str, Any],
     mesh: int,
-    primitives: list[TrianglePrimitive],
+    surfaces: Sequence[Surface],
     matrix: Float[np.ndarray, "4 4"],
     weights: list[float],
     joints: Float[np.ndarray, "J 4 4"] | None,
 ) -> MeshFile:
     """Return a mesh in the world, closed at its seams, by its morphs and its joints."""
+    primitives = [surface.primitive for surface in surfaces]
     positions = np.concatenate([p.attributes["POSITION"] for p in primitives]).astype(np.float64)
     follows = read_skin_and_morph(primitives)
     for weight, delta in zip(weights, follows.deltas, strict=False):
         positions += weight * delta.astype(np.float64)
     faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
-    welded = weld(positions, faces, follows.labels)
+    known = [surface.vertex for surface in surfaces if surface.vertex is not None]
+    if len(known) == len(surfaces):
+        welded = weld_by_label(positions, faces, np.concatenate(known))
+    else:
+        welded = weld(positions, faces, follows.labels)
     used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
     rows = np.empty(len(welded.points), dtype=np.int64)
     rows[welded.vertex_of[used]] = used

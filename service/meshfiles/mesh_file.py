@@ -148,6 +148,8 @@ def joined_layer(
 
     Colours of different types become fractions with opacity.
     """
+    if len(parts) == 1 and parts[0][0] is not None:
+        return Layer(parts[0][0], parts[0][1])
     given = [values for values, _ in parts if values is not None]
     rows: list[Int[np.ndarray, " C"]] = []
     total = 0

@@ -135,8 +135,18 @@ def distinct_corners(
     for layer in layers.values():
         if not any(np.array_equal(layer.rows, column) for column in columns):
             columns.append(layer.rows)
-    labels = vertex if len(columns) == 1 else distinct_rows(np.stack(columns, axis=1))
-    return number_by_first_appearance(labels)
+    if all(_follows(column, columns[-1]) for column in columns[:-1]):
+        return number_by_first_appearance(columns[-1])
+    return number_by_first_appearance(distinct_rows(np.stack(columns, axis=1)))
+
+
+def _follows(column: Int[np.ndarray, " C"], other: Int[np.ndarray, " C"]) -> bool:
+    """Return whether corners with one number in another column have one in this."""
+    if (other < 0).any():
+        return False
+    of_other = np.zeros(int(other.max(initial=0)) + 1, dtype=column.dtype)
+    of_other[other] = column
+    return bool((of_other[other] == column).all())
 
 
 def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:

@@ -375,8 +375,10 @@ def write_ply(mesh: MeshFile) -> bytes:
 
     add(("x", "y", "z"), mesh.vertices, real)
     for name, layer in mesh.layers.items():
-        values = np.zeros((len(mesh.vertices), layer.values.shape[1]), dtype=layer.values.dtype)
-        values[mesh.corners] = layer.values[layer.rows]
+        values = layer.values
+        if layer.rows is not mesh.corners:
+            values = np.zeros((len(mesh.vertices), values.shape[1]), dtype=values.dtype)
+            values[mesh.corners] = layer.values[layer.rows]
         names = _names_of(name, values.shape[1])
         kind = values.dtype.str[1:]
         add(names, values, "f4" if kind == "f8" or kind not in _NAMES else kind)
@@ -429,6 +431,9 @@ def _face_bytes(
         corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
         rows = [np.full(len(chosen), size), *corners.T, *(column[chosen] for column in columns)]
         kinds = [("", count), *[("", "i4")] * size, *fields]
-        table = _records(kinds, rows, len(chosen)).view(np.uint8).reshape(len(chosen), -1)
+        table = _records(kinds, rows, len(chosen))
+        if len(chosen) == len(sizes):
+            return table.tobytes()
+        table = table.view(np.uint8).reshape(len(chosen), -1)
         content[starts[chosen, None] + np.arange(table.shape[1])] = table
     return content.tobytes()

@@ -13,10 +13,10 @@ from service.errors import UnrefinableError
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
 from service.meshfiles.convert import Written, converted
-from service.meshfiles.flatten import flatten
 from service.meshfiles.mesh_file import COLOUR, MATERIAL, MeshFile
 from service.options import Limits, Options
 from tests.support.gltf import files
+from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import box
 from tests.support.shared import shared_path
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError, LimitError, UnrefinableError
-from service.meshfiles.flatten import flatten
-from service.meshfiles.formats import write
-from service.options import Limits
+from service.meshfiles.convert import converted
+from service.meshfiles.formats import read, write
+from service.options import Limits, Options
 from tests.support.gltf import files
+from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import octahedron
 
 
@@ -190,3 +191,28 @@ def test_joints_of_a_hidden_skeleton_move_what_is_shown():
     tree["scenes"][0]["nodes"] = [0, 1]
     flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
     assert flat.vertices[:, 0].min() == pytest.approx(4)
+
+
+@pytest.mark.parametrize("weld", ["position", "index"])
+def test_a_scene_has_the_triangles_of_the_glb_that_would_be_written(weld):
+    """Whatever a node does: two primitives of one mesh, placed twice, once mirrored."""
+    tree, binary = files.document([octahedron()])
+    tree["nodes"] = [{"mesh": 0}, {"mesh": 0, "translation": [5, 0, 0], "scale": [-1, 1, 1]}]
+    tree["scenes"][0]["nodes"] = [0, 1]
+    asked = files.pack(tree, binary), "glb"
+    options = Options(scheme="loop", levels=2, weld=weld)
+    scene = read(converted(*asked, "ply", options, None, Limits()).content, "ply")
+    glb = converted(*asked, "glb", options, None, Limits()).content
+    expected, _ = flatten(glb, "ply", Limits())
+    np.testing.assert_allclose(
+        scene.vertices[scene.corners], expected.vertices[expected.corners], atol=1e-6
+    )
+
+
+def test_only_a_gltf_is_compressed():
+    data = files.pack(*files.document([octahedron()]))
+    options = Options(scheme="loop", levels=1, compress="draco")
+    packed = converted(data, "glb", "ply", options, None, Limits())
+    assert "not compressed: only a glTF is" in {c["what"] for c in packed.report["changes"]}
+    plain = converted(data, "glb", "ply", Options(scheme="loop", levels=1), None, Limits())
+    assert packed.content == plain.content

@@ -12,10 +12,10 @@ from pns_common.operator.scheme import catmull_clark
 from service.errors import InvalidParameter, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.convert import Written, converted
-from service.meshfiles.flatten import flatten
 from service.meshfiles.mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, UV, MeshFile
 from service.options import Limits, Options
 from tests.support.gltf import files
+from tests.support.gltf.flattened import flatten
 from tests.support.shared import shared_path
 
 CORNERS = [(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]

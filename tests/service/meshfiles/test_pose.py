@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError
-from service.meshfiles.flatten import flatten
 from service.options import Limits
 from tests.support.gltf import files
+from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import octahedron
 
 # A quarter turn about z.
