@@ -61,7 +61,9 @@ def make_pairs(
     """
     folder.mkdir(parents=True, exist_ok=True)
     listed = [(number, shape) for number, shape in enumerate(listed_shapes(TRAINING))]
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    # A process for each shape: what MeshLab collapses depends on what it collapsed before.
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, spawn, max_tasks_per_child=1) as pool:
         real = [
             pool.submit(_keep_real, shapes, folder, number, shape, seed, polygons)
             for number, shape in listed
