@@ -8,7 +8,7 @@ import onnx
 
 from pns_common import ModelError, load_model, pns
 from pns_common.files import replace_file
-from pns_common.model.card import CARD_KEY, DEFAULT_FORMAT
+from pns_common.model.card import CARD_KEY, PAPER_FORMAT
 from pns_common.model.file import check_file
 from train.metrics.card import MEASURES, ONE_STEP, TO_LIMIT
 from train.metrics.one_step import improvements_as_data
@@ -27,7 +27,7 @@ def measure_anew(path: Path, on_measured: Callable[[str], None]) -> None:
         raise ModelError(str(path), expected="a model file", found="none")
     data = path.read_bytes()
     card, scheme, metrics = check_file(data, path.stem), pns(load_model(path)), {}
-    for name in TO_LIMIT if card.format == DEFAULT_FORMAT else ONE_STEP:
+    for name in ONE_STEP if card.format == PAPER_FORMAT else TO_LIMIT:
         metrics[name] = improvements_as_data(MEASURES[name](scheme))
         on_measured(name)
     proto = onnx.load_from_string(data)
