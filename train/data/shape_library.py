@@ -86,7 +86,7 @@ def take_shapes(mirror: Path, folder: Path) -> tuple[int, list[str]]:
         if source != path:
             path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("wb") as file:
-                np.savez(file, **arrays)
+                np.savez(file, allow_pickle=False, **arrays)
         if shape.set == VALIDATION:
             rows.append((path.name, shape.kind))
         count += 1
