@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from pns_common.model.card import ModelCard
+from pns_common.model.card import PAPER_FORMAT, ModelCard
 from pns_common.model.file import DEFAULT_MODEL
 from pns_common.model.session import OnnxModel
 
@@ -29,6 +29,9 @@ ROWS = {
     "fold_angle": "fold angle θ",
     "sharpness_levels": "sharpness levels",
     "sharpness_features": "sharpness features",
+    "face_features": "face features",
+    "width": "width W",
+    "rounds": "rounds",
 }
 # A metric on the card: what was measured, and its improvement over the reference in per cent.
 HEADINGS = {
@@ -63,7 +66,7 @@ def print_models(models: Iterable[OnnxModel]) -> None:
     for model in models:
         card = model.card
         name = f"{model.name} *" if model.name == DEFAULT_MODEL else model.name
-        rule = "no" if card.vertex_features is None else "yes"
+        rule = "no" if card.format == PAPER_FORMAT else "yes"
         values = [_text(card.budget), _text(card.gate_sharpness), *_headline(card)]
         table.add_row(name, card.features, card.orientation, rule, *values)
     console = Console(soft_wrap=True)

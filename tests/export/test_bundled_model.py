@@ -130,7 +130,8 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
     assert files[0] == files[1]
 
 
-@each_model
+# The default was trained in stages, which its card lists and no recipe runs.
+@pytest.mark.parametrize("name", sorted(set(BY_MODEL) - {"general"}))
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
     recipe = recipe_on_card(training)

@@ -92,6 +92,10 @@ def initial_vertex_network(recipe: Recipe) -> BoundedNet | None:
     return _keeping_symmetry(recipe, seen, seen.symmetries, recipe.vertex.hidden, generator)
 
 
+# The default has another network since: the sharpness that recipes name stands in its companion.
+KEPT_IN = {"general": "general-quad"}
+
+
 def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
     """Return the untrained sharpness network of a recipe, or another model's; None without one."""
     seen = recipe.sharpness
@@ -104,7 +108,7 @@ def initial_sharpness_network(recipe: Recipe) -> SharpNet | None:
 
 def taken_over(network: SharpNet, model: str) -> SharpNet:
     """Return a sharpness network with the weights of a bundled model's, which stay as they are."""
-    graph = onnx.load_from_string(load_model(model).data).graph
+    graph = onnx.load_from_string(load_model(KEPT_IN.get(model, model)).data).graph
     arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
     for number, layer in enumerate(network.linear_layers):
         layer.weight.data.copy_(torch.from_numpy(arrays[f"sharpness_weight_{number}"].copy()))
