@@ -71,8 +71,7 @@ class DirectedEdges:
         mesh, count = self.around.mesh, len(self.around.mesh.edges)
         faces = torch.where(self.half_edges[:, 0] < 0, len(mesh.faces), self.half_edges[:, 0] // 3)
         reverse = torch.arange(2 * count).roll(count)
-        first, second = self.ends.unbind(dim=1)
-        return Directed(first, second, reverse, faces, mesh.vertex_count, len(mesh.faces))
+        return Directed(*self.ends.T, reverse, faces, mesh.vertex_count, len(mesh.faces))
 
     @cached_property
     def along(self) -> Float[Tensor, "D 3"]:
@@ -97,8 +96,7 @@ class DirectedEdges:
     def axes(self) -> Float[Tensor, "D 3 3"]:
         """F: T, N and B as columns."""
         tangent, ends = unit(self.along), self.around.mean_normal[self.ends].sum(dim=1)
-        left, right = self.normals
-        sums = [v - dot(v, tangent)[:, None] * tangent for v in (left + right, ends)]
+        sums = [v - dot(v, tangent)[:, None] * tangent for v in (sum(self.normals), ends)]
         clear, instead = (unit(v, NO_MEAN) for v in sums)
         normal = torch.where((dot(clear, clear) > 0)[:, None], clear, instead)
         return torch.stack([tangent, normal, torch.linalg.cross(normal, tangent)], dim=2)
@@ -236,9 +234,7 @@ class DirectedRule:
         ringed = mesh.ringed & (marks.sharpest[0][:, 1] < 1)
         acts = torch.cat([ringed, mesh.paired & (mesh.sharpness < 1)])
         gate = acts * torch.cat(self.gates(sharpened, edges.jumps))
-        # Corners for good are no part of a curve.
-        held = {"sharpness": marks.sharpness, "corners": sharpened.corners.floor()}
-        curves = Curves(replace(sharpened, **held), points)
+        curves = Curves(marks, points)
         pushes = self.curve_strength * curves.pushes(self.vertex_gate_sharpness)
         unit_budget, share = self.budget / reference_length, curves.shares
         envelope, on_curve = unit_budget * squares * acts, unit_budget * curves.squares

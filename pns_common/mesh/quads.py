@@ -37,7 +37,7 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
     vertex_count = parent.vertex_count + edge_count + parent.face_count
     offsets = np.arange(0, len(corners) + 1, QUAD, dtype=np.int32)
     worn = parent.worn_vertices(vertex_count)
-    soft_corners = parent.soft_corners_of_split(vertex_count) if inherit else NO_WEIGHTS
+    soft_corners = parent.soft_corners_of_split(vertex_count, inherit=inherit)
     if not parent.plain:
         made = build_topology((corners, offsets), vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)

@@ -262,21 +262,20 @@ class Topology:
         return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
 
     def with_soft_corners(self, weights: Float[np.ndarray, " V"]) -> Topology:
-        """Return a copy with learned corner weights, where they are less.
-
-        Vertices of weight 1 are corners for good.
-        """
-        made = self.with_vertex_sharpness(np.where(weights >= 1, np.inf, 0.0))
-        weights = np.where(weights >= 1, 0.0, weights)
+        """Return a copy with learned corner weights, where they are less."""
         if len(self.soft_corners):
             weights = np.maximum(weights, self.soft_corners)
-        return replace(made, soft_corners=weights if weights.any() else NO_WEIGHTS)
+        return replace(self, soft_corners=weights if weights.any() else NO_WEIGHTS)
 
-    def soft_corners_of_split(self, count: int) -> Float[np.ndarray, " SV"]:
-        """Return ``soft_corners`` a level later, where there are ``count`` vertices."""
-        if len(self.soft_corners) == 0:
+    def soft_corners_of_split(self, count: int, *, inherit: bool) -> Float[np.ndarray, " SV"]:
+        """Return ``soft_corners`` a level later, where there are ``count`` vertices.
+
+        Those of weight 1, as where a border turns, stay for good.
+        """
+        kept = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
+        if not kept.any():
             return NO_WEIGHTS
-        return np.concatenate([self.soft_corners, np.zeros(count - self.vertex_count)])
+        return np.concatenate([kept, np.zeros(count - self.vertex_count)])
 
     def worn_vertices(self, count: int) -> Float[np.ndarray, " K"]:
         """Return ``vertex_sharpness`` a level later, where there are ``count`` vertices."""
@@ -393,7 +392,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     """
     faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
     worn = parent.worn_vertices(vertex_count)
-    soft_corners = parent.soft_corners_of_split(vertex_count) if inherit else NO_WEIGHTS
+    soft_corners = parent.soft_corners_of_split(vertex_count, inherit=inherit)
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)

@@ -325,6 +325,8 @@ def directed_gates(
     at_corners = np.repeat(opened, np.diff(mesh.offsets))
     at_vertices = np.zeros(mesh.vertex_count)
     np.maximum.at(at_vertices, mesh.corners, at_corners)
+    if len(mesh.vertex_sharpness):
+        at_vertices *= 1 - np.minimum(mesh.vertex_sharpness, 1.0)  # corners that are named
     most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
     np.maximum.at(most, mesh.corner_edges, at_corners)
     np.minimum.at(least, mesh.corner_edges, at_corners)

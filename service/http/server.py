@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import logging
 import os
@@ -48,7 +49,8 @@ def serve(settings: Settings) -> None:
         log_lines.configure()
         app = create_app(settings)
         if settings.metrics_port is not None:
-            serve_metrics(app, settings.metrics_host, settings.metrics_port)
+            own = settings.metrics_host, settings.metrics_port
+            serve_metrics(app, *own, of_service=settings.port)
     # What is loaded stays: to search it for cycles again and again holds the event loop for tens of
     # milliseconds.
     gc.collect()
@@ -59,13 +61,15 @@ def serve(settings: Settings) -> None:
     Server(configuration(app, settings)).run()
 
 
-def serve_metrics(app: FastAPI, host: str, port: int) -> None:
-    """Serve the metrics of an application on a port of their own. Raises StartError."""
+def serve_metrics(app: FastAPI, host: str, port: int, of_service: int) -> None:
+    """Serve the metrics on a port that is not the service's own. Raises StartError."""
+    hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
+    if port and port == of_service:
+        raise StartError(f"metrics on {host}:{port}: {os.strerror(errno.EADDRINUSE)}; {hint}")
     try:
         port = app.state.metrics.serve(host, port)
     except OSError as error:
-        reason, hint = error.strerror, "give a PNS_METRICS_PORT that is free"
-        raise StartError(f"metrics on {host}:{port}: {reason}; {hint}") from error
+        raise StartError(f"metrics on {host}:{port}: {error.strerror}; {hint}") from error
     log.info("metrics on http://%s:%d/metrics", host, port)
 
 

@@ -123,8 +123,10 @@ class ModelEntry(BaseModel):
         description="feature set of the vertices inside polygons; null where faces are triangles"
     )
     sharpness_features: str | None = Field(
-        description="feature set that says how sharp edges are; null where no network does"
+        description="feature set of a network for sharpness alone; null without one"
     )
+    width: int | None = Field(description="numbers in a state of format 5; null in others")
+    rounds: int | None = Field(description="rounds of messages of format 5; null in others")
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

@@ -32,7 +32,7 @@ MOST_PREFERRED = 1000
 # of its time.
 OBJECTS_A_SEARCH = 50_000
 # What a terminal sends to the workers of a process too: Ctrl-C, and that it closes.
-OF_TERMINAL = {signal.SIGINT, signal.SIGHUP}
+OF_TERMINAL = {getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)}
 
 
 class JobFaultError(Exception):

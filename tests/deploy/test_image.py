@@ -46,7 +46,7 @@ def test_what_is_installed_is_what_the_tests_ran_with():
 def test_what_the_service_names_is_in_the_image():
     project = (ROOT / "pyproject.toml").read_text()
     named = set()
-    for table in ("dependencies", "service", "store", "tracing"):
+    for table in ("dependencies", "service", "tracing"):
         (block,) = re.findall(rf"^{table} = \[\s*(.*?)\]$", project, re.MULTILINE | re.DOTALL)
         named |= {normal(name) for name in re.findall(r'"([A-Za-z0-9._-]+)', block)}
     installed = set(pins(REQUIREMENTS[0])) | set(pins(REQUIREMENTS[2]))

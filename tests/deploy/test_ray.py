@@ -153,7 +153,7 @@ def test_what_is_set_around_a_command_of_ours_does_not_make_it_refuse_to_start()
     """`pns` refuses a PNS_… that is no setting; what these files read is set in its shell."""
     texts = [path.read_text() for path in DEPLOY.rglob("*") if path.is_file()]
     read = {name for text in texts for name in re.findall(r"\$\{?(\w+)", text)}
-    assert {"RAY_PORT", "RAY_AUTH_TOKEN", "REDIS_IMAGE"} <= read
+    assert {"RAY_PORT", "RAY_AUTH_TOKEN"} <= read
     settings = {f"PNS_{name.upper()}" for name in Settings.model_fields}
     assert {name for name in read if name.startswith("PNS_")} <= settings
 

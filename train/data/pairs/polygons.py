@@ -142,7 +142,8 @@ def in_polygons(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     fair = np.flatnonzero((skewed < SKEWED) & (turns[..., 0] > 0).all(axis=1) & (bent < 1))
     rows = fair[np.argsort(skewed[fair] + bent[fair], kind="stable")]
     chosen = np.zeros(len(rows), dtype=bool)
-    pair_up(*(corners[rows] // 3).T, free, chosen)
+    first, second = np.ascontiguousarray((corners[rows] // 3).T)
+    pair_up(first, second, free, chosen)
     return Mesh(points, [*parts, *quads[rows[chosen]], *mesh.faces[free]])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -34,6 +34,11 @@ class WatchedModel:
     def hash(self) -> str:
         """The sha256 of the model file."""
         return self.model.hash
+
+    @property
+    def feature_type(self) -> type[np.floating[Any]]:
+        """The floating type in which features are best given."""
+        return getattr(self.model, "feature_type", np.float64)
 
     def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
         """Return corrections of a block of edges."""
