@@ -1,4 +1,4 @@
-"""What a network of directed edges sees on a mesh, and what it answers there.
+"""Networks of directed edges: their features, rounds of messages and answers on a mesh.
 
 Each edge is two directed edges, a → b and b → a, with a state each. After r rounds a state depends
 on what lies within r + 1 rings of the edge, and on nothing else. Features are in the edge's own
@@ -50,7 +50,7 @@ class DirectedNetworks:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What the network says of a mesh, in world axes and in units of h.
+    """Answers of the network on a mesh, in world axes and in units of h.
 
     Attributes:
         edges, vertices: (E, 3), (V, 3): F z, where the vertex is asked to go from flat.

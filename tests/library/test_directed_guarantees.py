@@ -1,4 +1,4 @@
-"""What models of directed edges promise for any weights, over Loop and over Catmull–Clark."""
+"""Promises of models of directed edges for any weights, over Loop and Catmull–Clark."""
 
 import numpy as np
 import pytest
