@@ -105,7 +105,7 @@ def curve_pushes(curves: Curves, gate_sharpness: float) -> Float[np.ndarray, "V 
 
 
 def corner_shares(curves: Curves) -> Float[np.ndarray, " N"]:
-    """Return 1 − f of the vertices ``curves.rows``: 1 where the curve turns by a right angle."""
+    """Return 1 − f of the vertices ``curves.rows``: 1 at corners, from a turn of 75 degrees on."""
     return np.clip((_turning(curves) - BEND) / (CORNER - BEND), 0.0, 1.0)
 
 

@@ -145,14 +145,14 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
         return slice(begin, end), slice(count + begin, count + end)
 
     def encode(begin: int, end: int) -> None:
-        rows = checked(networks.encoder, directed_features(level, begin, end, kind), width)
+        rows = checked_answers(networks.encoder, directed_features(level, begin, end, kind), width)
         there, back = both(begin, end)
         states[there], states[back] = rows[: end - begin], rows[end - begin :]
 
     def hear(update: Network, begin: int, end: int) -> None:
         messages = np.empty((2 * (end - begin), 6 * width), dtype=kind)
         kernels.gather(states, pooled, edges, begin, end, messages)
-        more, (there, back) = checked(update, messages, width), both(begin, end)
+        more, (there, back) = checked_answers(update, messages, width), both(begin, end)
         # Both ways of an edge stand in one block: nobody else reads these rows any more.
         states[there] += more[: end - begin]
         states[back] += more[end - begin :]
@@ -166,7 +166,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     def answer(begin: int, end: int) -> None:
         there, back = both(begin, end)
         rows = np.concatenate([states[there], states[back]])
-        heads = checked(networks.heads, rows, networks.answers).astype(np.float64)
+        heads = checked_answers(networks.heads, rows, networks.answers).astype(np.float64)
         kernels.read_heads(*geometry, *of_edges, heads, begin, end, asked, of_leaving, logits)
         for own, column in (corner_logits, kernels.CORNER), (heights, kernels.FACE):
             if len(own):
@@ -196,7 +196,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     return Answers(asked, of_vertices, faces, _sigmoid(logits), _sigmoid(vertex_logits))
 
 
-def checked(network: Network, rows: Float[np.ndarray, "N K"], columns: int) -> np.ndarray:
+def checked_answers(network: Network, rows: Float[np.ndarray, "N K"], columns: int) -> np.ndarray:
     """Return a network's answers.
 
     Raises:

@@ -33,7 +33,6 @@ edge, and (1 − w₂) δ + (w₂ − w₃) Π_ρ(D along the curve) at an old v
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count as rounds_from_0
 from typing import Any
@@ -41,13 +40,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.errors import ModelError, ParameterError
+from pns_common.errors import ParameterError
 from pns_common.kernels import children, correction, frames, measures, quads
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.mesh.topology import Topology
 from pns_common.model.features import FeatureSet
 from pns_common.operator.curves import Curves, curve_prior, curve_pushes, find_curves
-from pns_common.operator.directed import DirectedNetworks, answers_of
+from pns_common.operator.directed import DirectedNetworks, Network, answers_of, checked_answers
 from pns_common.operator.level import Level
 
 # Rows of each call of a network: fixed, so that answers do not depend on threads; one chunk.
@@ -55,9 +54,6 @@ NETWORK_ROWS = 4096
 # After so many halvings s becomes 0.
 ROUNDS = 30
 EVERYWHERE, NONE_SHARED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-
-# Features (N, K) → answers (N, A).
-Network = Callable[[Float[np.ndarray, "N K"]], Float[np.ndarray, "N A"]]
 
 
 @dataclass(frozen=True)
@@ -523,25 +519,6 @@ def answers(network: Network | None, at: Inputs, columns: int = 3) -> Float[np.n
     rows = slice(None) if every else is_open
     made[rows, :columns] = checked_answers(network, asked, columns)
     return made
-
-
-def checked_answers(
-    network: Network, features: Float[np.ndarray, "N K"], columns: int
-) -> Float[np.ndarray, "N A"]:
-    """Return a network's answers.
-
-    Raises:
-        ModelError: an answer is not finite, or has another shape.
-    """
-    z = np.asarray(network(features))
-    if z.dtype.kind not in "fiub":
-        raise ModelError("network", expected="real numbers", found=f"{z.dtype}")
-    if z.shape != (len(features), columns):
-        expected = f"shape ({len(features)}, {columns})"
-        raise ModelError("network", expected=expected, found=f"{z.shape}")
-    if not np.isfinite(z).all():
-        raise ModelError("network", expected="finite answers", found="NaN or infinity")
-    return z
 
 
 # --- the guard ------------------------------------------------------------------------------------

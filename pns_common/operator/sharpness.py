@@ -25,12 +25,11 @@ from pns_common.mesh.normals import measure_faces
 from pns_common.mesh.topology import Topology
 from pns_common.model.file import load_model
 from pns_common.operator.curves import corner_shares, find_curves
-from pns_common.operator.directed import answers_of
+from pns_common.operator.directed import answers_of, checked_answers
 from pns_common.operator.formula import (
     NETWORK_ROWS,
     DirectedRule,
     Rule,
-    checked_answers,
     directed_gates,
 )
 from pns_common.operator.level import Level
