@@ -22,7 +22,7 @@ const AMISS = {
     "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n",
   ].join("\n"),
   "lines.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nl 1 2 \\\n3 4\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
-  "far.obj": `v 4e6 4e6 0\nv ${4e6 + 1} 4e6 0\nv 4e6 ${4e6 + 1} 0\nv 4e6 4e6 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n`,
+  "far.obj": `v 4e6 4e6 0\nv ${4e6 + 0.25} 4e6 0\nv 4e6 ${4e6 + 0.25} 0\nv 4e6 4e6 0.25\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n`,
   "no-scene.gltf": JSON.stringify({ ...bare(), scene: undefined, scenes: undefined }),
   "no-node.gltf": JSON.stringify({ ...bare(), scene: undefined, scenes: undefined, nodes: undefined }),
   "two-scenes.gltf": JSON.stringify({

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import { choose, columns, noBrowser, picture, settled } from "./support/browser.mjs";
-import { positions, report } from "./support/glb.mjs";
+import { largestTurn, positions, report } from "./support/glb.mjs";
 import { CUBE, PYRAMID } from "./support/solids.mjs";
 import { example, same, studio } from "./support/studio.mjs";
 
@@ -55,7 +55,6 @@ describe("pictures", { skip: noBrowser, timeout: 1_800_000 }, () => {
   });
 
   test("a heat map colours the result alone, and its legend knows the report's largest number", async () => {
-    // The report's turns are those of smooth edges alone.
     const page = await visit({ hash: "#levels=2&layout=side&crease=off" });
     await choose(page, example);
     await settled(page);
@@ -66,12 +65,12 @@ describe("pictures", { skip: noBrowser, timeout: 1_800_000 }, () => {
       ["pns", "loop"].map((scheme) => refined(`levels=2&crease=off&scheme=${scheme}`)),
     );
     // The second level is Loop's: what the first one did is carried there.
-    const [learned, last] = report(ours).levels;
+    const [learned] = report(ours).levels;
     const wanted = {
       distance: largestDistance(positions(ours), positions(loop)),
       ratio: Math.max(learned.proximity_ratio.max, learned.vertex_rule.proximity_ratio.max),
       gate: Math.max(learned.gate.max, learned.vertex_rule.gate.max),
-      dihedral: (last.normal_jump_max * 180) / Math.PI,
+      dihedral: largestTurn(ours),
     };
     for (const [heat, end] of Object.entries(wanted)) {
       await page.selectOption("#look", heat);

@@ -33,6 +33,42 @@ export function positions(bytes) {
   );
 }
 
+/** The largest angle, in degrees, between two triangles that share an edge, whose ends are told by their places. */
+export function largestTurn(bytes) {
+  const { json, bin } = read(bytes);
+  const places = positions(bytes);
+  const beside = new Map();
+  let largest = 0;
+  json.meshes.flatMap((mesh) => mesh.primitives).forEach(({ indices }, primitive) => {
+    const { bufferView, byteOffset = 0, componentType, count } = json.accessors[indices];
+    const at = bin.byteOffset + (json.bufferViews[bufferView].byteOffset ?? 0) + byteOffset;
+    const Kind = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array }[componentType];
+    const corners = new Kind(bin.buffer.slice(at, at + count * Kind.BYTES_PER_ELEMENT));
+    for (let first = 0; first < count; first += 3) {
+      const points = [0, 1, 2].map((k) => [...places[primitive].slice(3 * corners[first + k], 3 * corners[first + k] + 3)]);
+      const normal = unitNormal(points);
+      for (const [start, end] of [[0, 1], [1, 2], [2, 0]]) {
+        const key = [points[start], points[end]].map(String).sort().join(" ");
+        const other = beside.get(key);
+        if (other) largest = Math.max(largest, angle(normal, other));
+        beside.set(key, normal);
+      }
+    }
+  });
+  return largest;
+}
+
+function unitNormal([a, b, c]) {
+  const [u, v] = [b, c].map((point) => point.map((value, axis) => value - a[axis]));
+  const normal = [0, 1, 2].map((i) => u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]);
+  return normal.map((value) => value / Math.hypot(...normal));
+}
+
+function angle(one, other) {
+  const cosine = one.reduce((sum, value, axis) => sum + value * other[axis], 0);
+  return (Math.acos(Math.max(-1, Math.min(1, cosine))) * 180) / Math.PI;
+}
+
 export function report(bytes) {
   return read(bytes).json.asset.extras.pns;
 }
