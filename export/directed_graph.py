@@ -13,6 +13,7 @@ from export.onnx_graph import (
 from pns_common.model.card import ModelCard
 from pns_common.model.session import networks
 from train.models.directed import DirectedNet
+from train.models.torch_model import layers_of
 
 
 def directed_bytes(network: DirectedNet, card: ModelCard) -> bytes:
@@ -22,10 +23,10 @@ def directed_bytes(network: DirectedNet, card: ModelCard) -> bytes:
     own in one graph, and the operator passes messages between them.
     """
     graph, held = Graph(), networks(card)
-    layers: list[nn.Module] = [network.encoder, *network.rounds, network.heads]
-    for each, layer in zip(held, layers, strict=True):
+    layers = layers_of(network, card)
+    for each in held:
         graph.prefix = f"{each.given}_"
-        linear = [part for part in layer.modules() if isinstance(part, nn.Linear)]
+        linear = [part for part in layers[each.given].modules() if isinstance(part, nn.Linear)]
         value = each.given
         for index, part in enumerate(linear):
             weight = graph.constant(f"weight_{index}", array(part.weight))

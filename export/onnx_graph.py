@@ -8,7 +8,7 @@ from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 from torch import Tensor
 
 from pns_common.model.card import CARD_KEY, ModelCard
-from train.models.networks import BoundedNet, SharpNet, SymmetricNet
+from train.models.networks import BoundedNet, SymmetricNet
 
 # New enough for every operator here; runtimes of the last years all read it.
 OPSET = 17
@@ -17,43 +17,18 @@ OPSET = 17
 IR_VERSION = 8
 
 
-def model_bytes(
-    network: BoundedNet,
-    card: ModelCard,
-    vertex_network: BoundedNet | None = None,
-    sharpness_network: SharpNet | None = None,
-    face_network: BoundedNet | None = None,
-) -> bytes:
+def model_bytes(network: BoundedNet, card: ModelCard) -> bytes:
     """Return the model file: features [edges, K] and budget in, corrections [edges, 3] out.
 
-    With a vertex network also vertex_features [vertices, L] in and vertex_correction out; with a
-    face network face_features [faces, M] in and face_correction [faces, 1] out; with a sharpness
-    network sharpness_features [edges, P] in, and its sigmoid out, sharpness [edges, 1].
     The projection onto the ball is inside, so ‖correction‖ ≤ budget whatever the weights are.
-    Only long-standing standard operators: GELU and SiLU are spelt out. Tied weights are written
-    as the dense matrices that they make.
+    Only long-standing standard operators: GELU and SiLU are spelt out.
     """
     graph = Graph()
-    _add_network(graph, network, "features", "correction")
-    inputs, outputs = [_rows("features", "edges", network)], [answers_info("correction", "edges")]
-    if vertex_network is not None:
-        graph.prefix = "vertex_"
-        _add_network(graph, vertex_network, "vertex_features", "vertex_correction")
-        inputs.append(_rows("vertex_features", "vertices", vertex_network))
-        outputs.append(answers_info("vertex_correction", "vertices"))
-    if face_network is not None:
-        graph.prefix = "face_"
-        _add_network(graph, face_network, "face_features", "face_correction")
-        inputs.append(_rows("face_features", "faces", face_network))
-        outputs.append(answers_info("face_correction", "faces", 1))
-    if sharpness_network is not None:
-        graph.prefix = "sharpness_"
-        answer = _perceptron(graph, sharpness_network, "sharpness_features")
-        graph.apply("Sigmoid", answer, output="sharpness")
-        # Rows of a name of their own: those of equal names share buffers, also between networks.
-        inputs.append(_rows("sharpness_features", "sharpened", sharpness_network))
-        outputs.append(answers_info("sharpness", "sharpened", 1))
-    return _serialise(graph, inputs, outputs, card)
+    make = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
+    _project_onto_ball(graph, make(graph, network, "features"))
+    features = rows_info("features", "edges", network.linear_layers[0].in_features)
+    budget = helper.make_tensor_value_info("budget", TensorProto.FLOAT, [])
+    return serialised(graph, [features, budget], [answers_info("correction", "edges")], card)
 
 
 class Graph:
@@ -85,13 +60,7 @@ class Graph:
         return name
 
 
-def _add_network(graph: Graph, network: BoundedNet, features: str, output: str) -> None:
-    perceptron = _symmetric_perceptron if isinstance(network, SymmetricNet) else _perceptron
-    columns = network.linear_layers[-1].out_features
-    _project_onto_ball(graph, perceptron(graph, network, features), output, columns)
-
-
-def _perceptron(graph: Graph, network: BoundedNet | SharpNet, value: str) -> str:
+def _perceptron(graph: Graph, network: BoundedNet, value: str) -> str:
     """Add the layers and return what the last one makes."""
     for index, layer in enumerate(network.linear_layers):
         value = _layer(graph, network, index, value, array(layer.weight), array(layer.bias))
@@ -123,7 +92,7 @@ def _symmetric_perceptron(graph: Graph, network: BoundedNet, features: str) -> s
 
 def _layer(
     graph: Graph,
-    network: BoundedNet | SharpNet,
+    network: BoundedNet,
     index: int,
     value: str,
     weight: np.ndarray,
@@ -162,20 +131,16 @@ def _tanh(graph: Graph, x: str) -> str:
 _ACTIVATIONS = {"gelu": _gelu, "silu": silu, "tanh": _tanh}
 
 
-def _project_onto_ball(graph: Graph, z: str, output: str, columns: int) -> None:
+def _project_onto_ball(graph: Graph, z: str) -> None:
     """Add budget · z / √max(1, ‖z‖²).
 
     A product with ones puts ‖z‖² into all columns: onnxruntime divides equal shapes several
     times as fast as it spreads one column over three.
     """
     square = graph.apply("Mul", z, z)
-    square = graph.apply("MatMul", square, graph.constant("ones", np.ones((columns, columns))))
+    square = graph.apply("MatMul", square, graph.constant("ones", np.ones((3, 3))))
     divisor = graph.apply("Sqrt", graph.apply("Max", square, graph.constant("one", 1.0)))
-    graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output=output)
-
-
-def _rows(name: str, rows: str, network: BoundedNet | SharpNet) -> ValueInfoProto:
-    return rows_info(name, rows, network.linear_layers[0].in_features)
+    graph.apply("Mul", graph.apply("Div", z, divisor), "budget", output="correction")
 
 
 def rows_info(name: str, rows: str, width: int) -> ValueInfoProto:
@@ -186,13 +151,6 @@ def rows_info(name: str, rows: str, width: int) -> ValueInfoProto:
 def answers_info(name: str, rows: str, columns: int = 3) -> ValueInfoProto:
     """Describe an output of so many columns."""
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, columns])
-
-
-def _serialise(
-    graph: Graph, features: list[ValueInfoProto], outputs: list[ValueInfoProto], card: ModelCard
-) -> bytes:
-    budget = helper.make_tensor_value_info("budget", TensorProto.FLOAT, [])
-    return serialised(graph, [features[0], budget, *features[1:]], outputs, card)
 
 
 def serialised(

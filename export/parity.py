@@ -1,25 +1,24 @@
 """Does the file say what the trained network says? Checked before anything is written."""
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
-from pns_common.errors import ModelError, PnsError
-from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS, Feature
+from pns_common.errors import PnsError
+from pns_common.model.features import FEATURE_SETS, Feature
 from pns_common.model.session import OnnxModel, networks
 from train.models.directed import DirectedNet
-from train.models.networks import BoundedNet, SharpNet
+from train.models.networks import BoundedNet
+from train.models.torch_model import layers_of
 
 # Largest difference allowed, as a fraction of the budget and of the row's largest feature.
 #
 # Single precision rounds what the layers add up: a sliver whose features are 30 in size rounds 30
-# times as much as a triangle, in torch as in the file. Features below 1 count as 1. Of the
-# bundled networks the default's rounds most, by 1.4e-6: it was trained longest, and its weights
-# are largest.
+# times as much as a triangle, in torch as in the file. Features below 1 count as 1.
 TOLERANCE = 3e-6
 
 # Of networks of directed edges, as a fraction of the largest answer.
@@ -53,61 +52,15 @@ class ParityError(PnsError):
         )
 
 
-def check_parity(
-    model: OnnxModel,
-    network: BoundedNet,
-    tolerance: float = TOLERANCE,
-    vertex_network: BoundedNet | None = None,
-    face_network: BoundedNet | None = None,
-) -> Parity:
+def check_parity(model: OnnxModel, network: BoundedNet, tolerance: float = TOLERANCE) -> Parity:
     """Compare the file, run by onnxruntime in float32, with the torch network in float64.
 
     Against torch's float32 the rounding of torch would count too; it is the larger of the two.
 
     Raises:
         ParityError: they differ by more than `tolerance` of a budget.
-        ModelError: only one of the two has a rule for old vertices.
     """
-    if (vertex_network is None) != (model.card.vertex_features is None):
-        raise ModelError(
-            model.name,
-            expected="a vertex rule where the checkpoint has one, and only there",
-            found=f"vertex features {model.card.vertex_features}",
-        )
     seen = FEATURE_SETS[model.card.features].features
-    made = [_compare(model, network, seen, tolerance)]
-    if vertex_network is not None and model.card.vertex_features is not None:
-        seen = RING_FEATURE_SETS[model.card.vertex_features].features
-        made.append(_compare(model.vertex_correction, vertex_network, seen, tolerance))
-    if face_network is not None and model.card.face_features is not None:
-        seen = FACE_FEATURE_SETS[model.card.face_features].features
-        made.append(_compare(model.face_correction, face_network, seen, tolerance))
-    return Parity(max(each.difference for each in made), max(each.length for each in made))
-
-
-def check_sharpness(model: OnnxModel, network: SharpNet, tolerance: float = TOLERANCE) -> None:
-    """Compare a file's sharpness network with the torch network in float64.
-
-    Raises:
-        ParityError: they differ by more than `tolerance`.
-        ModelError: the file has no sharpness network.
-    """
-    features = sample_features(network.linear_layers[0].in_features)
-    size = np.maximum(np.abs(features).max(axis=1, keepdims=True), 1)
-    with torch.no_grad():
-        expected = copy.deepcopy(network).double()(torch.from_numpy(features).double()).sigmoid()
-    difference = float((np.abs(model.sharpness(features) - expected.numpy()) / size).max())
-    # Written so that NaN fails it too.
-    if not difference <= tolerance:
-        raise ParityError(budget=1.0, difference=difference, tolerance=tolerance)
-
-
-def _compare(
-    answers: Callable[[np.ndarray, float], np.ndarray],
-    network: BoundedNet,
-    seen: Sequence[Feature],
-    tolerance: float,
-) -> Parity:
     features = within(sample_features(len(seen)), seen)
     exact = copy.deepcopy(network).double()
     size = np.maximum(np.abs(features).max(axis=1, keepdims=True), 1)
@@ -115,7 +68,7 @@ def _compare(
     for budget in BUDGETS:
         with torch.no_grad():
             expected = exact(torch.from_numpy(features).double(), budget).numpy()
-        answered = np.asarray(answers(features, budget))
+        answered = model.run("features", features, budget)
         difference = float((np.abs(answered - expected) / size).max()) / budget
         # Written so that NaN fails it too.
         if not difference <= tolerance:
@@ -155,12 +108,11 @@ def check_directed(
     Raises:
         ParityError: an answer differs by more than `tolerance` of the largest one.
     """
-    layers = [network.encoder, *network.rounds, network.heads]
-    rng, largest = np.random.default_rng(0), 0.0
+    layers, rng, largest = layers_of(network, model.card), np.random.default_rng(0), 0.0
     with torch.no_grad():
-        for held, layer in zip(networks(model.card), layers, strict=True):
+        for held in networks(model.card):
             rows = rng.normal(size=(ROWS, held.columns)).astype(np.float32)
-            true = layer(torch.from_numpy(rows)).numpy()
+            true = layers[held.given](torch.from_numpy(rows)).numpy()
             difference = np.abs(model.run(held.given, rows) - true).max() / np.abs(true).max()
             largest = max(largest, float(difference))
     if not largest <= tolerance:

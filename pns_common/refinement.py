@@ -19,7 +19,7 @@ from pns_common.mesh.quads import QUAD
 from pns_common.mesh.reference_length import measure_reference_length
 from pns_common.mesh.selection import Selected, chosen_faces, select
 from pns_common.mesh.topology import TRIANGLE, Topology
-from pns_common.operator.formula import Additions, DirectedRule, directed_level, learned_level
+from pns_common.operator.formula import Additions
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import NAMES, Scheme, named_scheme
 from pns_common.operator.sharpness import with_sharp_edges
@@ -279,7 +279,7 @@ def control_level(
 ) -> Level:
     """Return the level that the first step of ``refine`` reads: for training and experiments.
 
-    ``operator.edge_inputs``, ``vertex_inputs``, ``prior`` and ``guard_scale`` take it.
+    ``operator.surroundings``, ``edge_inputs`` and ``guard_scale`` take it.
 
     Raises:
         ParameterError: an argument out of range, or a crease that is no edge.
@@ -315,11 +315,7 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
     if scheme.acts_at(depth) and level.reference_length and scheme.rule is not None:
         # An absurd budget overflows, which is caught just below.
         with np.errstate(over="ignore", invalid="ignore"):
-            added = (
-                directed_level(level, scheme.rule)
-                if isinstance(scheme.rule, DirectedRule)
-                else learned_level(level, scheme.rule)
-            )
+            added = scheme.rule(level)
         points = added.points
     else:
         points = level.base.place(level.points, level.topology, level.blocks)

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from pns_common.model.card import PAPER_FORMAT, ModelCard
+from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL
 from pns_common.model.session import OnnxModel
 
@@ -20,16 +20,12 @@ ROWS = {
     "gate_sharpness": "gate sharpness c",
     "budget": "budget C",
     "orientation": "orientation",
-    "vertex_features": "vertex features",
     "vertex_gate_sharpness": "vertex gate sharpness c",
     "base": "base scheme",
-    "prior_strength": "prior strength s",
     "boundary_strength": "boundary strength b",
     "network_scale": "network scale τ",
     "fold_angle": "fold angle θ",
     "sharpness_levels": "sharpness levels",
-    "sharpness_features": "sharpness features",
-    "face_features": "face features",
     "width": "width W",
     "rounds": "rounds",
 }
@@ -59,16 +55,15 @@ def print_models(models: Iterable[OnnxModel]) -> None:
     """Print a line a model, the default one marked."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("model", overflow="fold")
-    for heading in ("features", "orientation", "vertex\nrule"):
+    for heading in ("features", "orientation"):
         table.add_column(heading)
     for heading in ("C", "c", *HEADLINE_COLUMNS):
         table.add_column(heading, justify="right")
     for model in models:
         card = model.card
         name = f"{model.name} *" if model.name == DEFAULT_MODEL else model.name
-        rule = "no" if card.format == PAPER_FORMAT else "yes"
         values = [_text(card.budget), _text(card.gate_sharpness), *_headline(card)]
-        table.add_row(name, card.features, card.orientation, rule, *values)
+        table.add_row(name, card.features, card.orientation, *values)
     console = Console(soft_wrap=True)
     console.print(table, _LEGEND, sep="\n", markup=False, highlight=False)
 

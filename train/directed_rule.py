@@ -149,7 +149,7 @@ class DirectedEdges:
     @property
     def jumps(self) -> Float[Tensor, " E"]:
         """x = 1 − n₁ · n₂; 0 at edges without two faces."""
-        return self.around.turns[0][::2, 0]
+        return self.around.jumps
 
     def turn(self, height: Float[Tensor, " D"]) -> Float[Tensor, " D"]:
         """Return the angle between the two faces' normals, negative in valleys (`height` > 0)."""

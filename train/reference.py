@@ -5,8 +5,9 @@ Written from the paper and from the derivations behind docs/explanation/guarante
 speed. All is float64. Symbols are those of docs/reference/features.md; a, b, c, d are an edge's
 ends and opposite vertices.
 
-    format 1    q  = q0 + h² γ (C / R) F Π₁ η(φ)
-    format 4    x' = x0 + s γ Π_ρ(D + τ ℓ F z(φ)),    ρ = C h² / R,    x0 = S_w p
+    q  = q0 + h² γ (C / R) F Π₁ η(φ)
+
+This is format 1; `directed_rule` is format 5.
 """
 
 import math
@@ -20,13 +21,12 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from train.connectivity import Connectivity
-from train.curve_rule import Curves
-from train.loop_masks import limit_weight, loop_mask
+from train.loop_masks import loop_mask
 from train.tensors import dot, ratio, root, shortened, unit
 
-# Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), a
-# mean normal has no direction (its length), and a side's logarithm is cut off.
-NO_AREA, ANTIPARALLEL, CLEAR_NORMAL, SHORTEST = 1e-12, 1e-6, 1 / 4, 1e-150
+# Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), and a
+# side's logarithm is cut off.
+NO_AREA, ANTIPARALLEL, SHORTEST = 1e-12, 1e-6, 1e-150
 # The guard gives up after so many halvings; a child may not shrink below this share of its area.
 ROUNDS, LEAST_AREA = 30, 1e-3
 
@@ -89,21 +89,12 @@ class Surroundings:
         return (self.mesh.sharpest[0][:, :1] < 1) * ratio(lean, root(self.square))
 
     @cached_property
-    def turns(self) -> tuple[Float[Tensor, "S 1"], Float[Tensor, "S 1"]]:
-        """x = ‖n − n'‖² / 2 and s = (n × n') · T of each spoke; 0 at edges sharp for good."""
-        left = read_edges(self, first_face=False)
-        whole = (dot(left.n1, left.n1) > 0) & (dot(left.n2, left.n2) > 0)
-        apart, across = left.n1 - left.n2, torch.linalg.cross(left.n1, left.n2)
-        both = (torch.where(whole, dot(apart, apart) / 2, 0.0), dot(across, unit(left.b - left.a)))
-        smooth = self.mesh.sharpness < 1
-        jump, bend = ((smooth * value).repeat_interleave(2)[:, None] for value in both)
-        return jump, bend
-
-    def gates_beside(self, gate_sharpness: float) -> Float[Tensor, " E"]:
-        """Return the smaller gate of an edge's two faces: the largest (1 − w) tanh(c_v x)."""
-        gates = (1 - self.mesh.sharpness) * torch.tanh(gate_sharpness * self.turns[0][::2, 0])
-        of_faces = gates[self.mesh.face_edges].max(dim=1).values
-        return of_faces[self.mesh.half_edges // 3].min(dim=1).values
+    def jumps(self) -> Float[Tensor, " E"]:
+        """x = ‖n − n'‖² / 2 of each edge; 0 at edges sharp for good."""
+        edges = read_edges(self, first_face=False)
+        whole = (dot(edges.n1, edges.n1) > 0) & (dot(edges.n2, edges.n2) > 0)
+        apart = edges.n1 - edges.n2
+        return torch.where(whole & (self.mesh.sharpness < 1), dot(apart, apart) / 2, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,14 +154,6 @@ def edge_frames(edges: EdgeReading, *, first_face: bool) -> Frames:
     return Frames(axes, length, torch.where(no_curvature, 0.0, 1 - cosine), degenerate)
 
 
-def edge_extents(edges: EdgeReading) -> Float[Tensor, " E"]:
-    """Return ℓ: the length of each edge, or the mean altitude over it if that is less."""
-    along = edges.b - edges.a
-    length = root(dot(along, along))
-    c, d = (torch.linalg.cross(along, side - edges.a) for side in (edges.c, edges.d))
-    return torch.minimum(length, ratio(root(dot(c, c)) + root(dot(d, d)), 2 * length))
-
-
 def paper_5(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float[Tensor, "E 5"]:
     """Return x and the logarithms of ac, bc, ad, bd over h."""
     sides = (edges.c - edges.a, edges.c - edges.b, edges.d - edges.a, edges.d - edges.b)
@@ -196,43 +179,6 @@ def signed_18(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float
 
 
 EDGE_FEATURES = MappingProxyType({"paper-5": paper_5, "signed-18": signed_18})
-
-
-def ring_10(around: Surroundings) -> Float[Tensor, "V 10"]:
-    """Return the features of old vertices."""
-    mesh, mean, size = around.mesh, around.mean, root(around.square)
-    (jump, bend), height = around.turns, around.height
-    lengths = root(dot(around.spokes, around.spokes))[:, None]
-    tilt = around.mean_normal[mesh.rims] - around.mean_normal[mesh.centres]
-    columns = [
-        mean(jump),
-        mean(bend),
-        mean(bend**2),
-        height,
-        ratio(dot(around.umbrella, around.umbrella)[:, None], around.square),
-        dot(around.mean_normal, around.mean_normal)[:, None],
-        mean(height[mesh.rims]),
-        ratio(mean(dot(tilt, around.spokes)[:, None]), size),
-        ratio(mean(lengths), size),
-        mean(mean(jump)[mesh.rims]),
-    ]
-    return torch.cat(columns, dim=1)
-
-
-def ring_vectors(around: Surroundings) -> Float[Tensor, "V 3 3"]:
-    """Return e₁ = m_v, e₂ = u_v / h_v and e₃ = mean of (x / 2)(p_j − p_v) / h_v as columns."""
-    pull, size = around.mean(around.turns[0] / 2 * around.spokes), root(around.square)
-    three = (around.mean_normal, ratio(around.umbrella, size), ratio(pull, size))
-    return torch.stack(three, dim=2)
-
-
-def pushes(around: Surroundings) -> Float[Tensor, "V 3"]:
-    """Return d_v at s = 1: p less its limit, along the normal; 0 at open rings and sharp edges."""
-    mean = around.mean_normal
-    normal = mean / root(dot(mean, mean)).clamp(min=CLEAR_NORMAL)[:, None]
-    share = limit_weight(around.mesh.valence) * around.mesh.ringed
-    height = share * (1 - around.mesh.sharpest[0][:, 1]) * dot(around.umbrella, normal)
-    return -height[:, None] * normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,73 +245,6 @@ class PaperRule:
         envelope = self.budget / reference_length * frames.length**2 * interior
         turned = (frames.axes @ local[:, :, None])[:, :, 0]
         return on_edges(points, mesh, (envelope * gate)[:, None] * turned, envelope, gate)
-
-
-@dataclass(frozen=True)
-class GeneralRule:
-    """The operator of format 4 at its learned level.
-
-    Attributes:
-        edge_network, vertex_network: answer z, shortened to length 1 here.
-        budget: C.
-        gate_sharpness, vertex_gate_sharpness: c and c_v.
-        prior_strength: s.
-        boundary_strength: of the prior along boundaries and creases.
-        network_scale: τ.
-        fold_angle: θ, degrees.
-        features: φ of edges.
-    """
-
-    edge_network: Network
-    vertex_network: Network
-    budget: float
-    gate_sharpness: float
-    vertex_gate_sharpness: float
-    prior_strength: float
-    boundary_strength: float
-    network_scale: float
-    fold_angle: float
-    features: Callable[[Surroundings, EdgeReading, Frames], Tensor] = signed_18
-
-    def __call__(
-        self, points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float = 1.0
-    ) -> Step:
-        """Take the learned step."""
-        around, masks, one = Surroundings(mesh, points), loop_mask(mesh), points.new_ones(())
-        curves = Curves(mesh, points)
-        of_curves = self.boundary_strength * curves.pushes(self.vertex_gate_sharpness)
-        prior, along = (
-            masks(self.prior_strength * pushes(around) + of_curves),
-            curves.prior(of_curves),
-        )
-        edges = read_edges(around, first_face=False)
-        frames = edge_frames(edges, first_face=False)
-        interior, blend = mesh.paired & (mesh.sharpness < 1), mesh.sharpest[0][:, 1]
-        ringed = mesh.ringed & (blend < 1)
-        own = torch.tanh(self.gate_sharpness * frames.curvature**2)
-        opened = around.gates_beside(self.vertex_gate_sharpness)
-        opened = torch.where(frames.degenerate, 0.0, opened)
-        edge_gate = (1 - mesh.sharpness) * (own + (1 - own) * opened)
-        z = shortened(self.edge_network(self.features(around, edges, frames)[interior]), one)
-        local = torch.zeros_like(edges.a).index_put((interior,), z)
-        turned = edge_extents(edges)[:, None] * (frames.axes @ local[:, :, None])[:, :, 0]
-        jump = around.mean(around.turns[0])[:, 0]
-        vertex_gate = (1 - blend) * ringed * torch.tanh(self.vertex_gate_sharpness * jump)
-        z = shortened(self.vertex_network(ring_10(around)[ringed]), one)
-        weights = torch.zeros_like(points).index_put((ringed,), z)
-        pulled = root(around.square) * (ring_vectors(around) @ weights[:, :, None])[:, :, 0]
-        asked = prior + self.network_scale * torch.cat([pulled, turned])
-        squares = torch.cat([around.square[:, 0] * ringed, frames.length**2 * interior])
-        # On curves there is neither gate nor network.
-        share, gate = curves.shares, torch.cat([vertex_gate, edge_gate])
-        unit_budget = self.budget / reference_length
-        envelope, on_curve = unit_budget * squares, unit_budget * curves.squares
-        displacement = gate[:, None] * shortened(asked, envelope)
-        displacement = displacement + share[:, None] * shortened(along, on_curve)
-        envelope = (1 - share) * envelope + share * on_curve
-        base, alone = masks(points), curves.of_boundary
-        scale = fold_guard(mesh.split(), base, displacement, self.fold_angle, alone)
-        return Step(base, displacement, envelope, gate, scale)
 
 
 def fold_guard(

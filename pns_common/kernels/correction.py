@@ -85,46 +85,6 @@ def correct_by_equation_1(
 
 
 @kernel
-def correct_by_prior(
-    rows: i8_1d | u4_1d,
-    first: int,
-    begin: int,
-    end: int,
-    z: f8_2d,
-    basis: f8_2d,
-    reach: f8_1d,
-    gate: f8_1d,
-    bound: f8_1d,
-    weight: f8_1d,
-    displacement: f8_2d,
-    ratio: f8_1d,
-    gates: f8_1d,
-    bounds: f8_1d,
-):
-    """Write δ = w γ Π_ρ(D + τ ℓ F z), ‖z‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
-
-    Row 0 of the arrays from ``z`` to ``weight`` is that of rows[begin].
-
-    Args:
-        reach: τ ℓ, the length that the network may ask for.
-        bound: ρ.
-        weight: w, 1 but at soft edges.
-        displacement: in: D; out: δ.
-    """
-    for i in range(max(begin, 0), end):
-        here, at = i - begin, first + rows[i]
-        asked = combined(in_ball(row(z, here)), basis, here)
-        wanted = (
-            displacement[at, 0] + reach[here] * asked[0],
-            displacement[at, 1] + reach[here] * asked[1],
-            displacement[at, 2] + reach[here] * asked[2],
-        )
-        inside, size = shortened(wanted, bound[here]), weight[here] * gate[here]
-        delta = size * inside[0], size * inside[1], size * inside[2]
-        _write(at, delta, gate[here], bound[here], displacement, ratio, gates, bounds)
-
-
-@kernel
 def correct_from_flat(
     rows: u4_1d,
     first: int,

@@ -391,3 +391,33 @@ def find_leaving(
             v = edges[e, side]
             spokes[stops[v]] = e + side * count
             stops[v] += 1
+
+
+@kernel
+def spread_gates(
+    corners: u4_1d,
+    offsets: i4_1d,
+    corner_edges: u4_1d,
+    of_edges: f8_1d,
+    opened: f8_1d,
+    at_vertices: f8_1d,
+    most: f8_1d,
+    least: f8_1d,
+):
+    """Write how open faces are: the largest of their edges; and of these the largest and least.
+
+    Args:
+        of_edges: (E,) in [0, 1].
+        opened: (F,) out.
+        at_vertices: (V,) the largest around each; in: 0.
+        most, least: (E,) of the faces beside each edge; in: 0 and 1.
+    """
+    for f in range(offsets.shape[0] - 1):
+        gate = 0.0
+        for h in range(offsets[f], offsets[f + 1]):
+            gate = max(gate, of_edges[corner_edges[h]])
+        opened[f] = gate
+        for h in range(offsets[f], offsets[f + 1]):
+            e, v = corner_edges[h], corners[h]
+            most[e], least[e] = max(most[e], gate), min(least[e], gate)
+            at_vertices[v] = max(at_vertices[v], gate)

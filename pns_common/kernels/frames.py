@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from pns_common.kernels import (
     b1_1d,
     f4_2d,
     f8_1d,
     f8_2d,
-    i4_1d,
     i4_2d,
     i8_1d,
     inlined,
@@ -18,17 +15,14 @@ from pns_common.kernels import (
     u4_2d,
 )
 from pns_common.kernels.connectivity import next_corner, previous_corner
-from pns_common.kernels.measures import CLEAR_NORMAL, HEIGHT
+from pns_common.kernels.measures import HEIGHT
 from pns_common.kernels.vectors import (
     across,
     between,
     cross,
-    difference,
     divisor,
     dot,
-    norm,
     over,
-    root,
     row,
 )
 
@@ -59,14 +53,6 @@ def edge_frame(n, m, spoke):
     return tangent, normal, cross(tangent, normal), 0.0 if undefined else 1 - cosine, fallback
 
 
-@inlined
-def _extent(h, p, q, c, d):
-    """Return h = ‖q − p‖, or the mean altitude of c and d over the edge from p to q if less."""
-    spoke = difference(q, p)
-    twice = norm(cross(spoke, difference(c, p))) + norm(cross(spoke, difference(d, p)))
-    return min(h, twice / (2 * h)) if h > 0 else 0.0
-
-
 @kernel
 def frames_and_features(
     points: f8_2d,
@@ -74,7 +60,6 @@ def frames_and_features(
     fields: f8_2d,
     lengths: f8_1d,
     logs: f8_1d,
-    opened: f8_1d,
     corners: u4_1d,
     edges: u4_2d,
     corner_edges: u4_1d,
@@ -86,9 +71,7 @@ def frames_and_features(
     starts: i8_1d,
     frames: f8_2d,
     curvature: f8_1d,
-    sides: f8_1d,
     length: f8_1d,
-    extent: f8_1d,
     degenerate: b1_1d,
     features: f4_2d | f8_2d,
 ):
@@ -97,15 +80,12 @@ def frames_and_features(
     Args:
         fields: (V, 4) mean normals and umbrella heights; (0, 4) where no group reads rings.
         lengths, logs: (E,) lengths and their logarithms.
-        opened: (F,) gates of the faces; (0,) where they are not wanted.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
             lies in the face of lower index.
         starts: the first column of each group of features, −1 for none.
         frames: (N, 9) out: T, N, B.
         curvature: (N,) out: x.
-        sides: (N,) out: the smaller gate of both faces, 0 where there is no frame.
         length: (N,) out: h.
-        extent: (N,) out: ℓ.
         degenerate: (N,) out: whether the frame is the fallback.
         features: (N, K) out.
     """
@@ -130,10 +110,6 @@ def frames_and_features(
         for k in range(3):
             frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
         curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(opened):
-            sides[to] = 0.0 if fallback else min(opened[h1 // 3], opened[h2 // 3])
-        p, q = row(points, a), row(points, b)
-        extent[to] = _extent(lengths[e], p, q, row(points, c), row(points, d))
         at = logs[ac], logs[bc], logs[ad], logs[bd]
         _write_two_faces(features, to, starts, x, at, logs[e], dot(cross(n, m), t))
         if len(fields):
@@ -199,145 +175,3 @@ def wing(values, h, corners, offsets, face_of_corner):
             w += values[v, 3] if width > HEIGHT else 0.0
     count = stop - first - 2
     return x / count, y / count, z / count, w / count
-
-
-@inlined
-def _log(p, q):
-    """Return the logarithm of a distance."""
-    spoke = difference(p, q)
-    return math.log(max(root(dot(spoke, spoke)), SHORTEST))
-
-
-@kernel
-def polygon_frames_and_features(
-    points: f8_2d,
-    normals: f8_2d,
-    fields: f8_2d,
-    lengths: f8_1d,
-    logs: f8_1d,
-    opened: f8_1d,
-    corners: u4_1d,
-    offsets: i4_1d,
-    face_of_corner: u4_1d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    rows: u4_1d,
-    begin: int,
-    end: int,
-    starts: i8_1d,
-    frames: f8_2d,
-    curvature: f8_1d,
-    sides: f8_1d,
-    length: f8_1d,
-    extent: f8_1d,
-    degenerate: b1_1d,
-    features: f4_2d | f8_2d,
-):
-    """Write what ``frames_and_features`` does with ``symmetric``, of edges between polygons.
-
-    In place of the opposite vertices c and d stand the means of the faces' other corners, where
-    fields are means too.
-    """
-    for i in range(begin, end):
-        e, to = rows[i], i - begin
-        a, b = edges[e, 0], edges[e, 1]
-        h1, h2 = half_edges[e, 0], half_edges[e, 1]
-        if corners[h1] != a:
-            h1, h2 = h2, h1
-        f, g = face_of_corner[h1], face_of_corner[h2]
-        n, m = row(normals, f), row(normals, g)
-        t, up, side, x, fallback = edge_frame(n, m, between(points, a, b))
-        if fallback:
-            x = 0.0
-        for k in range(3):
-            frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
-        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
-        if len(opened):
-            sides[to] = 0.0 if fallback else min(opened[f], opened[g])
-        c = wing(points, h1, corners, offsets, face_of_corner)
-        d = wing(points, h2, corners, offsets, face_of_corner)
-        p, q = row(points, a), row(points, b)
-        extent[to] = _extent(lengths[e], p, q, c[:3], d[:3])
-        at = _log(c, p), _log(c, q), _log(d, p), _log(d, q)
-        _write_two_faces(features, to, starts, x, at, logs[e], dot(cross(n, m), t))
-        if len(fields):
-            at_c = wing(fields, h1, corners, offsets, face_of_corner)
-            at_d = wing(fields, h2, corners, offsets, face_of_corner)
-            at_a, at_b = four(fields, a), four(fields, b)
-            _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d)
-
-
-# --- face vertices --------------------------------------------------------------------------------
-
-# Columns of a face's measures: its normal, h², ℓ, and face-8.
-NORMAL, SQUARE, EXTENT, FACE_FEATURES, FACE_MEASURES = 0, 3, 4, 5, 13
-
-
-@kernel
-def measure_face_vertices(
-    points: f8_2d,
-    fields: f8_2d,
-    corners: u4_1d,
-    offsets: i4_1d,
-    corner_edges: u4_1d,
-    lengths: f8_1d,
-    jumps: f8_1d,
-    bends: f8_1d,
-    rows: i8_1d,
-    begin: int,
-    end: int,
-    measures: f8_2d,
-):
-    """Write what the rule of face vertices reads, of faces rows[begin:end]; row 0 is the first.
-
-    The normal is the area vector over the sum of the areas of the triangles about the centroid,
-    scaled to length 1 where that is above CLEAR_NORMAL.
-
-    Args:
-        lengths, jumps, bends: (E,) of the edges: h, x, signed sine.
-        measures: (N, 13) out.
-    """
-    for i in range(begin, end):
-        f, to = rows[i], i - begin
-        first, stop = offsets[f], offsets[f + 1]
-        count = stop - first
-        centre = (0.0, 0.0, 0.0)
-        for h in range(first, stop):
-            p = row(points, corners[h])
-            centre = centre[0] + p[0] / count, centre[1] + p[1] / count, centre[2] + p[2] / count
-        mean, area = (0.0, 0.0, 0.0), 0.0
-        square, length, shortest, longest = 0.0, 0.0, math.inf, 0.0
-        jump, bend, least, most = 0.0, 0.0, math.inf, -math.inf
-        height, lowest, highest = 0.0, math.inf, -math.inf
-        for h in range(first, stop):
-            after = h + 1 if h + 1 < stop else first
-            u = difference(row(points, corners[h]), centre)
-            part = cross(u, difference(row(points, corners[after]), centre))
-            mean = mean[0] + part[0], mean[1] + part[1], mean[2] + part[2]
-            area += norm(part)
-            e, umbrella = corner_edges[h], fields[corners[h], HEIGHT]
-            square += lengths[e] * lengths[e] / count
-            length += lengths[e] / count
-            shortest, longest = min(shortest, lengths[e]), max(longest, lengths[e])
-            jump += jumps[e] / count
-            bend += bends[e] / count
-            least, most = min(least, bends[e]), max(most, bends[e])
-            height += umbrella / count
-            lowest, highest = min(lowest, umbrella), max(highest, umbrella)
-        divided = max(norm(mean), CLEAR_NORMAL * area)
-        normal = over(mean, divided) if divided > 0 else (0.0, 0.0, 0.0)
-        unevenness = 0.0
-        for h in range(first, stop):
-            over_plane = dot(difference(row(points, corners[h]), centre), normal)
-            unevenness += over_plane * over_plane / count
-        for k in range(3):
-            measures[to, NORMAL + k] = normal[k]
-        measures[to, SQUARE], measures[to, EXTENT] = square, shortest
-        measures[to, FACE_FEATURES] = jump
-        measures[to, FACE_FEATURES + 1] = bend
-        measures[to, FACE_FEATURES + 2] = (most + least) / 2
-        measures[to, FACE_FEATURES + 3] = (most - least) / 2
-        measures[to, FACE_FEATURES + 4] = height
-        measures[to, FACE_FEATURES + 5] = (highest - lowest) / 2
-        measures[to, FACE_FEATURES + 6] = unevenness / square if square > 0 else 0.0
-        measures[to, FACE_FEATURES + 7] = shortest / longest if longest > 0 else 0.0

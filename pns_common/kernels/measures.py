@@ -9,14 +9,11 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import (
-    b1_1d,
-    f4_2d,
     f8_1d,
     f8_2d,
     i1_1d,
     i4_1d,
     i4_2d,
-    i8_1d,
     i8_2d,
     inlined,
     kernel,
@@ -36,16 +33,12 @@ from pns_common.kernels.vectors import (
     row,
 )
 
-# Columns of a vertex's means over its spokes: umbrella vector, squared length, x, signed bend and
-# its square, length, pull; then over its neighbours: opening, umbrella height, mean x.
-UMBRELLA, SQUARE, JUMP, BEND, BEND_SQUARE, LENGTH, PULL = 0, 3, 4, 5, 6, 7, 8
-OPENING, NEAR_HEIGHT, NEAR_JUMP, MEANS = 11, 12, 13, 14
+# Columns of a vertex's means over its spokes: umbrella vector, squared length, length.
+UMBRELLA, SQUARE, LENGTH, MEANS = 0, 3, 4, 5
 # Columns of a vertex's fields: mean normal, umbrella height.
 HEIGHT, FIELDS = 3, 4
 # Column of a face's area vector with its length.
 AREA = 3
-# Below this length a mean normal is not scaled to 1; the mean is 1 where all faces agree.
-CLEAR_NORMAL = 1 / 4
 SHORTEST_SQUARE = 1e-300
 
 
@@ -112,30 +105,18 @@ def measure_edges(
     end: int,
     lengths: f8_1d,
     jumps: f8_1d,
-    bends: f8_1d,
 ):
-    """Write h, x = 1 − n1 · n2 and the signed sine of edges begin … end − 1.
-
-    x and the sine are 0 where an edge is not interior. The sine is positive at ridges.
-    """
+    """Write h and x = 1 − n1 · n2 of edges begin … end − 1; x is 0 where one is not interior."""
     for e in range(max(begin, 0), end):
         spoke = between(points, edges[e, 0], edges[e, 1])
-        square = dot(spoke, spoke)
-        length = root(square)
-        lengths[e], jumps[e], bends[e] = length, 0.0, 0.0
+        lengths[e], jumps[e] = root(dot(spoke, spoke)), 0.0
         if edge_class[e] != INTERIOR:
             continue
-        there, back = half_edges[e, 0], half_edges[e, 1]
-        if corners[there] != edges[e, 0]:
-            there, back = back, there
-        n = row(normals, face_of(there, face_of_corner))
-        m = row(normals, face_of(back, face_of_corner))
+        n = row(normals, face_of(half_edges[e, 0], face_of_corner))
+        m = row(normals, face_of(half_edges[e, 1], face_of_corner))
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = difference(n, m)
             jumps[e] = dot(chord, chord) / 2
-        if square > 0:
-            direction = spoke[0] / length, spoke[1] / length, spoke[2] / length
-            bends[e] = dot(cross(n, m), direction)
 
 
 @kernel
@@ -193,14 +174,10 @@ def mean_normals(
 
 
 @inlined
-def _add_spoke(means, v, spoke, square, jump, bend, length):
+def _add_spoke(means, v, spoke, square, length):
     for k in range(3):
         means[v, UMBRELLA + k] += spoke[k]
-        means[v, PULL + k] += jump / 2 * spoke[k]
     means[v, SQUARE] += square
-    means[v, JUMP] += jump
-    means[v, BEND] += bend
-    means[v, BEND_SQUARE] += bend * bend
     means[v, LENGTH] += length
 
 
@@ -209,8 +186,6 @@ def mean_spokes(
     points: f8_2d,
     edges: u4_2d,
     reach: i8_2d,
-    jumps: f8_1d,
-    bends: f8_1d,
     sharp: i4_1d,
     begin: int,
     end: int,
@@ -239,114 +214,14 @@ def mean_spokes(
             length = math.sqrt(square if square > 0 else SHORTEST_SQUARE)
             if mine:
                 valence[a] += 1
-                _add_spoke(means, a, spoke, square, jumps[e], bends[e], length)
+                _add_spoke(means, a, spoke, square, length)
             if theirs:
                 valence[b] += 1
                 back = -spoke[0], -spoke[1], -spoke[2]
-                _add_spoke(means, b, back, square, jumps[e], bends[e], length)
+                _add_spoke(means, b, back, square, length)
     for v in range(max(begin, 0), end):
-        for k in range(OPENING):
+        for k in range(MEANS):
             means[v, k] = means[v, k] / max(valence[v], 1)
         reach_of_ring = root(means[v, SQUARE])
         if reach_of_ring > 0 and (len(sharp) == 0 or sharp[v] == 0):
             fields[v, HEIGHT] = dot(row(means, v), row(fields, v)) / reach_of_ring
-
-
-@kernel
-def mean_neighbours(
-    points: f8_2d,
-    edges: u4_2d,
-    reach: i8_2d,
-    fields: f8_2d,
-    valence: i4_1d,
-    begin: int,
-    end: int,
-    means: f8_2d,
-):
-    """Write means over the neighbours of vertices begin … end − 1: opening, height, mean x."""
-    for block in range(reach.shape[0]):
-        first, count = skipped_block(edges, reach, block, begin, end)
-        for e in range(first, first + count):
-            a, b = edges[e, 0], edges[e, 1]
-            mine, theirs = begin <= a < end, begin <= b < end
-            if not (mine or theirs):
-                continue
-            opening = dot(between(fields, a, b), between(points, a, b))
-            if mine:
-                means[a, OPENING] += opening
-                means[a, NEAR_HEIGHT] += fields[b, HEIGHT]
-                means[a, NEAR_JUMP] += means[b, JUMP]
-            if theirs:
-                means[b, OPENING] += opening
-                means[b, NEAR_HEIGHT] += fields[a, HEIGHT]
-                means[b, NEAR_JUMP] += means[a, JUMP]
-    for v in range(max(begin, 0), end):
-        for k in range(OPENING, MEANS):
-            means[v, k] = means[v, k] / max(valence[v], 1)
-
-
-@kernel
-def vertex_features(
-    means: f8_2d, fields: f8_2d, rows: i8_1d, begin: int, end: int, features: f4_2d | f8_2d
-):
-    """Write the features ``ring-10`` of vertices rows[begin:end]; row 0 is the first of them."""
-    for i in range(max(begin, 0), end):
-        v = rows[i]
-        normal, umbrella, reach = row(fields, v), row(means, v), root(means[v, SQUARE])
-        features[i - begin, 0] = means[v, JUMP]
-        features[i - begin, 1] = means[v, BEND]
-        features[i - begin, 2] = means[v, BEND_SQUARE]
-        features[i - begin, 3] = fields[v, HEIGHT]
-        features[i - begin, 4] = _quotient(dot(umbrella, umbrella), means[v, SQUARE])
-        features[i - begin, 5] = dot(normal, normal)
-        features[i - begin, 6] = means[v, NEAR_HEIGHT]
-        features[i - begin, 7] = _quotient(means[v, OPENING], reach)
-        features[i - begin, 8] = _quotient(means[v, LENGTH], reach)
-        features[i - begin, 9] = means[v, NEAR_JUMP]
-
-
-@inlined
-def _quotient(value, by):
-    return value / by if by > 0 else 0.0
-
-
-@kernel
-def ring_basis(means: f8_2d, fields: f8_2d, rows: i8_1d, begin: int, end: int, basis: f8_2d):
-    """Write mean normal, umbrella and pull in units of h_v, of vertices rows[begin:end]: (N, 9)."""
-    for i in range(max(begin, 0), end):
-        v = rows[i]
-        reach = root(means[v, SQUARE])
-        for k in range(3):
-            basis[i - begin, k] = fields[v, k]
-            basis[i - begin, 3 + k] = _quotient(means[v, UMBRELLA + k], reach)
-            basis[i - begin, 6 + k] = _quotient(means[v, PULL + k], reach)
-
-
-@kernel
-def normal_pushes(
-    pull: f8_2d,
-    fields: f8_2d,
-    valence: i4_1d,
-    ringed: b1_1d,
-    weight: f8_1d,
-    strength: float,
-    begin: int,
-    end: int,
-    pushes: f8_2d,
-):
-    """Write d_v = −s w_k (u · m̂) m̂ of vertices begin … end − 1: the prior of the operator.
-
-    Args:
-        pull: (V, 3 or more) u: where w_k u leads is the limit.
-        ringed: (V,) whether the prior acts at a vertex.
-        weight: w_k for each valence.
-        strength: s.
-    """
-    for v in range(max(begin, 0), end):
-        mean = row(fields, v)
-        agreement = norm(mean)
-        clear = agreement if agreement > CLEAR_NORMAL else CLEAR_NORMAL
-        normal = mean[0] / clear, mean[1] / clear, mean[2] / clear
-        inwards = weight[valence[v]] * dot(row(pull, v), normal) if ringed[v] else 0.0
-        for k in range(3):
-            pushes[v, k] = strength * (-inwards * normal[k])

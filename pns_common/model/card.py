@@ -1,8 +1,7 @@
 """The model card: what a model file says of itself, as JSON in its metadata.
 
-Format 1 is the paper's operator: one network for edges, at every level. Format 4 is the default's:
-networks for edges and for old vertices, a prior and a fold guard, at level 0 alone; a third network
-may say how sharp edges are. Formats 2 and 3 were never released.
+Format 1 is the paper's operator: one network for edges, at every level. Format 5 is the default's:
+networks of directed edges and a fold guard, at level 0 alone. Formats 2 to 4 are not read any more.
 """
 
 from __future__ import annotations
@@ -14,58 +13,45 @@ from dataclasses import MISSING, dataclass, fields
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from pns_common.model.features import (
-    DIRECTED_28,
-    FACE_FEATURE_SETS,
-    FEATURE_SETS,
-    RING_FEATURE_SETS,
-)
+from pns_common.model.features import DIRECTED_28, FEATURE_SETS
 
 # The metadata key of an ONNX file that holds the card.
 CARD_KEY = "pns_card"
-PAPER_FORMAT, DEFAULT_FORMAT, DIRECTED_FORMAT = 1, 4, 5
-RETIRED_FORMATS = (2, 3)
+PAPER_FORMAT, DIRECTED_FORMAT = 1, 5
+RETIRED_FORMATS = (2, 3, 4)
 
 DIRECTED_FEATURES: Mapping[str, int] = MappingProxyType({DIRECTED_28.name: DIRECTED_28.count})
 # How many columns each feature set has.
-EDGE_FEATURES, VERTEX_FEATURES, FACE_FEATURES = (
-    MappingProxyType({name: seen.count for name, seen in sets.items()})
-    for sets in (FEATURE_SETS, RING_FEATURE_SETS, FACE_FEATURE_SETS)
+EDGE_FEATURES: Mapping[str, int] = MappingProxyType(
+    {name: seen.count for name, seen in FEATURE_SETS.items()}
 )
-SHARPNESS_FEATURES: Mapping[str, int] = MappingProxyType({"crease-53": 53})
 ORIENTATIONS = ("first-face", "symmetric")
 BASES = ("loop", "catmull-clark")
-# A prior of strength 1 is full quasi-interpolation; far beyond it squares leave the floats.
+# Along a curve 1 is full quasi-interpolation; far beyond it squares leave the floats.
 HIGHEST_STRENGTH = 100.0
 MOST_SHARPNESS_LEVELS = 16
 
 
 @dataclass(frozen=True)
 class ModelCard:
-    """Card of a model file. Fields after ``metrics`` belong to format 4 alone.
+    """Card of a model file. Fields after ``metrics`` belong to format 5 alone.
 
     Attributes:
-        format: Version of the file format, 1 or 4.
-        features: Name of the feature set that the edge network reads.
+        format: Version of the file format, 1 or 5.
+        features: Name of the feature set that the first network reads.
         gate_sharpness: c of the edge gate γ = tanh(c x²).
         budget: C that the model was trained at, and the default.
         orientation: How (a, b, c, d) are ordered: "first-face" or "symmetric".
         training: Recipe, seed and everything else that fixes the training; no dates.
         metrics: Measured on held-out data.
         base: Base scheme, "loop" or "catmull-clark".
-        vertex_features: Name of the feature set that the vertex network reads.
         vertex_gate_sharpness: c_v of the vertex gate γ_v = tanh(c_v x_v).
-        prior_strength: s of the prior D, 0 … 100; 1 is full quasi-interpolation.
         boundary_strength: Strength of the prior along boundary and crease curves, 0 … 100.
         network_scale: τ, the longest vector that the network may ask for, in edge lengths.
         fold_angle: θ of the fold guard, between 0 and 90 degrees.
         sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
-        face_features: Name of the feature set that the face network reads, over Catmull–Clark; None
-            over Loop, which has no vertices in faces.
-        sharpness_features: Name of the feature set that the sharpness network reads; None: there is
-            none.
-        width: W, how many numbers the state of a directed edge has; format 5.
-        rounds: How many rounds of messages these exchange; format 5.
+        width: W, how many numbers the state of a directed edge has.
+        rounds: How many rounds of messages these exchange.
     """
 
     format: int
@@ -76,15 +62,11 @@ class ModelCard:
     training: dict[str, Any]
     metrics: dict[str, Any]
     base: str | None = None
-    vertex_features: str | None = None
     vertex_gate_sharpness: float | None = None
-    prior_strength: float | None = None
     boundary_strength: float | None = None
     network_scale: float | None = None
     fold_angle: float | None = None
     sharpness_levels: int | None = None
-    face_features: str | None = None
-    sharpness_features: str | None = None
     width: int | None = None
     rounds: int | None = None
 
@@ -113,26 +95,23 @@ class ModelCard:
         return card
 
 
-_LEARNED_ONCE = frozenset(
-    {
-        "base",
-        "vertex_gate_sharpness",
-        "boundary_strength",
-        "network_scale",
-        "fold_angle",
-        "sharpness_levels",
-    }
-)
-# Beside the fields without a default: what a card of a format must have, and what it may have.
+# Beside the fields without a default: what a card of a format has.
 NEEDED: Mapping[int, frozenset[str]] = MappingProxyType(
     {
         PAPER_FORMAT: frozenset(),
-        DEFAULT_FORMAT: _LEARNED_ONCE | {"vertex_features", "prior_strength"},
-        DIRECTED_FORMAT: _LEARNED_ONCE | {"width", "rounds"},
+        DIRECTED_FORMAT: frozenset(
+            {
+                "base",
+                "vertex_gate_sharpness",
+                "boundary_strength",
+                "network_scale",
+                "fold_angle",
+                "sharpness_levels",
+                "width",
+                "rounds",
+            }
+        ),
     }
-)
-ALLOWED: Mapping[int, frozenset[str]] = MappingProxyType(
-    {DEFAULT_FORMAT: frozenset({"face_features", "sharpness_features"})}
 )
 
 Range = tuple[Callable[[Any], bool], str]
@@ -154,10 +133,7 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
         "budget": _POSITIVE,
         "orientation": _one_of(ORIENTATIONS),
         "base": _one_of(BASES),
-        "vertex_features": _one_of(VERTEX_FEATURES),
-        "face_features": _one_of(FACE_FEATURES),
         "vertex_gate_sharpness": _POSITIVE,
-        "prior_strength": _STRENGTH,
         "boundary_strength": _STRENGTH,
         "network_scale": _POSITIVE,
         "fold_angle": (lambda value: 0 < value < 90, "between 0 and 90 degrees"),
@@ -165,7 +141,6 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
             lambda value: 0 <= value <= MOST_SHARPNESS_LEVELS,
             f"from 0 to {MOST_SHARPNESS_LEVELS}",
         ),
-        "sharpness_features": _one_of(SHARPNESS_FEATURES),
         "width": (lambda value: 2 <= value <= 128 and value % 2 == 0, "even, from 2 to 128"),
         "rounds": (lambda value: 1 <= value <= 8, "from 1 to 8"),
     }
@@ -192,7 +167,7 @@ def _json_object(text: str) -> dict[str, Any]:
 def _check_format(version: object) -> None:
     """Check the format before all else. Raises ValueError."""
     if version in RETIRED_FORMATS:
-        raise ValueError(f"format {version}, which was never released: export the model anew")
+        raise ValueError(f"format {version}, which is not read any more: train and export it anew")
     if version not in NEEDED:
         raise ValueError(f"format {version}")
 
@@ -234,16 +209,10 @@ def _check_fields_of_format(card: ModelCard) -> None:
     """Check that the fields of its format stand there and no others. Raises ValueError."""
     given = {field.name for field in fields(card) if getattr(card, field.name) is not None}
     needed = NEEDED[card.format]
-    allowed = needed | ALLOWED.get(card.format, frozenset())
     optional = {field.name for field in fields(card) if field.default is None}
-    for name in sorted(given & optional - allowed):
+    for name in sorted(given & optional - needed):
         raise ValueError(f"unknown field {name} in format {card.format}")
     for name in sorted(needed - given):
         raise ValueError(f"missing field {name} in format {card.format}")
     if (card.features in DIRECTED_FEATURES) != (card.format == DIRECTED_FORMAT):
         raise ValueError(f"features {card.features!r} in format {card.format}")
-    if card.format == DEFAULT_FORMAT and (card.base == "catmull-clark") != (
-        card.face_features is not None
-    ):
-        problem = "missing" if card.face_features is None else "unknown"
-        raise ValueError(f"{problem} field face_features over {card.base}")

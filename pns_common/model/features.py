@@ -61,8 +61,6 @@ class Generator:
 HALF_TURN = Generator("half_turn", "abcd", "badc", (-1, 1, -1))
 MIRROR = Generator("mirror", "cd", "dc", (1, 1, -1))
 TURN_OVER = Generator("turn_over", "cd", "dc", (1, -1, -1))
-# The mean normal of a ring changes sign, sums of spokes do not.
-RING_TURN_OVER = Generator("turn_over", "", "", (-1, 1, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,36 +172,6 @@ _ENDS, _WINGS = FeatureGroup("ends", _tilts("ab")), FeatureGroup("wings", _tilts
 _UMBRELLA = FeatureGroup(
     "umbrella", tuple(Feature("umbrella", vertex, turn_over=-1) for vertex in "abcd")
 )
-_RING = FeatureGroup(
-    "ring",
-    (
-        Feature("mean jump", limit=2.0),
-        Feature("bend", turn_over=-1),
-        Feature("bend squared"),
-        Feature("umbrella height", turn_over=-1),
-        Feature("umbrella length"),
-        Feature("normal agreement"),
-        Feature("neighbours' umbrella height", turn_over=-1),
-        Feature("opening", turn_over=-1, limit=2.0),
-        Feature("evenness"),
-        Feature("neighbours' mean jump", limit=2.0),
-    ),
-)
-
-# Of a face: none depends on the order of its corners. A face's z is one number, along its normal.
-_FACE = FeatureGroup(
-    "face",
-    (
-        Feature("mean jump", limit=2.0),
-        Feature("mean bend", turn_over=-1),
-        Feature("middle of the bends", turn_over=-1),
-        Feature("half the range of the bends"),
-        Feature("corners' umbrella height", turn_over=-1),
-        Feature("half the range of these heights"),
-        Feature("unevenness"),
-        Feature("shortest side over longest"),
-    ),
-)
 
 
 def _vectors(kind: str, vertices: str) -> tuple[Feature, ...]:
@@ -238,14 +206,9 @@ PAPER_5 = FeatureSet("paper-5", (_CURVATURE, _SHAPE), _UNSIGNED)
 SIGNED_18 = FeatureSet(
     "signed-18", (_CURVATURE, _SHAPE, _DIHEDRAL, _ENDS, _WINGS, _UMBRELLA), _SIGNED
 )
-RING_10 = FeatureSet("ring-10", (_RING,), (RING_TURN_OVER,))
-
-FACE_8 = FeatureSet("face-8", (_FACE,), (RING_TURN_OVER,))
 DIRECTED_28 = FeatureSet("directed-28", (FeatureGroup("directed", _DIRECTED),), (MIRROR,))
 
-# Sets of edges, old vertices and faces, by the name on a model card.
+# Sets of the paper's rule, by the name on a model card.
 FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType(
     {features.name: features for features in (PAPER_5, SIGNED_18)}
 )
-RING_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({RING_10.name: RING_10})
-FACE_FEATURE_SETS: Mapping[str, FeatureSet] = MappingProxyType({FACE_8.name: FACE_8})

@@ -1,11 +1,10 @@
 """Model files: found, read, checked against their contract, and loaded.
 
 A file is one ONNX graph of at most ``LARGEST_FILE`` bytes: standard operators from an allow-list,
-no data outside it, the card under the metadata key ``pns_card``. Inputs are ``budget`` (a float32
-scalar) and ``features`` [edges, K], in format 4 also ``vertex_features`` [vertices, L] and, where
-the card names them, ``face_features`` [faces, M] and ``sharpness_features`` [edges, P]; outputs are
-``correction`` [edges, 3], ``vertex_correction`` [vertices, 3], ``face_correction`` [faces, 1] and
-``sharpness`` [edges, 1]. Hidden tensors of one call fill at most ``LARGEST_CALL`` bytes.
+no data outside it, the card under the metadata key ``pns_card``. In format 1 inputs are ``budget``
+(a float32 scalar) and ``features`` [edges, K], the output is ``correction`` [edges, 3]. In format 5
+each network has an input and an output of its own, as ``session.networks`` lists them. Hidden
+tensors of one call fill at most ``LARGEST_CALL`` bytes.
 
 The hashes of the bundled files stand in ``models/SHA256SUMS``: ``sha256sum -c`` reads it.
 """
@@ -196,7 +195,7 @@ def _card(proto: ModelProto, name: str) -> ModelCard:
     try:
         return ModelCard.from_json(texts[0])
     except ValueError as error:
-        expected = "a model card of format 1, 4 or 5"
+        expected = "a model card of format 1 or 5"
         raise ModelError(name, expected=expected, found=str(error)) from error
 
 

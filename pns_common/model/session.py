@@ -22,9 +22,6 @@ from pns_common.model.card import (
     DIRECTED_FEATURES,
     DIRECTED_FORMAT,
     EDGE_FEATURES,
-    FACE_FEATURES,
-    SHARPNESS_FEATURES,
-    VERTEX_FEATURES,
     ModelCard,
 )
 
@@ -39,7 +36,7 @@ MESSAGE_PARTS, HEADS = 6, 8
 
 @runtime_checkable
 class Model(Protocol):
-    """Networks with a card; every correction is a vector of norm ≤ budget."""
+    """Networks with a card, each called by the name of what it reads."""
 
     @property
     def card(self) -> ModelCard:
@@ -56,32 +53,13 @@ class Model(Protocol):
         """The sha256 of the model file."""
         ...
 
-    def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Return η of format 1 or z of format 4 in edge frames, (N, 3)."""
-        ...
+    def run(
+        self, given: str, rows: Float[np.ndarray, "N K"], budget: float = 1.0
+    ) -> Float[np.ndarray, "N A"]:
+        """Return the answers of the network that reads the input ``given``.
 
-    def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
-        """Return the weights of the ring vectors of old vertices, (N, 3); format 4 alone."""
-        ...
-
-    def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
-        """Return the sharpness of edges, (N, 1); where the card names features for it alone."""
-        ...
-
-
-class DirectedModel(Model, Protocol):
-    """A model of directed edges (format 5): several networks, each named by what it reads."""
-
-    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
-        """Return the answers of the network that reads the input ``given``."""
-        ...
-
-
-class PolygonModel(Model, Protocol):
-    """A model over Catmull–Clark, whose third network places the vertices of faces."""
-
-    def face_correction(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Return lengths along the normals of faces, (N, 1), of at most the budget."""
+        That of format 1 reads "features" and answers η in edge frames, of norm ≤ budget.
+        """
         ...
 
 
@@ -97,23 +75,8 @@ class Network:
 
 def networks(card: ModelCard) -> tuple[Network, ...]:
     """Return the networks that a file with this card holds."""
-    if card.format == DIRECTED_FORMAT:
-        return _directed_networks(card)
-    held = [Network("features", EDGE_FEATURES[card.features], "correction", 3)]
-    if card.vertex_features is not None:
-        columns = VERTEX_FEATURES[card.vertex_features]
-        held.append(Network("vertex_features", columns, "vertex_correction", 3))
-    if card.face_features is not None:
-        columns = FACE_FEATURES[card.face_features]
-        held.append(Network("face_features", columns, "face_correction", 1))
-    if card.sharpness_features is not None:
-        columns = SHARPNESS_FEATURES[card.sharpness_features]
-        held.append(Network("sharpness_features", columns, "sharpness", 1))
-    return tuple(held)
-
-
-def _directed_networks(card: ModelCard) -> tuple[Network, ...]:
-    """Return the encoder, the rounds and the heads of a model of directed edges."""
+    if card.format != DIRECTED_FORMAT:
+        return (Network("features", EDGE_FEATURES[card.features], "correction", 3),)
     assert card.width is not None
     assert card.rounds is not None
     width, answers = card.width, heads_of(card)
@@ -175,72 +138,31 @@ class OnnxModel:
         # A session cannot travel to another process; the file's bytes can.
         return OnnxModel, (self.name, self.hash, self.data, self._wanted, self.card)
 
-    def __call__(
-        self, features: Float[np.ndarray, "N K"], budget: float
-    ) -> Float32[np.ndarray, "N 3"]:
-        """Return corrections for features of edges and a dimensionless budget.
+    def run(
+        self, given: str, rows: Float[np.ndarray, "N K"], budget: float = 1.0
+    ) -> Float32[np.ndarray, "N A"]:
+        """Run the network that reads the input ``given``.
 
-        Raises:
-            ParameterError: features of another shape.
-            ModelError: the graph fails, or an answer is not finite or of another shape.
-        """
-        return self._answers("features", features, budget)
-
-    def vertex_correction(
-        self, features: Float[np.ndarray, "N L"], budget: float
-    ) -> Float32[np.ndarray, "N 3"]:
-        """Return weights of the ring vectors of old vertices.
-
-        Raises:
-            ParameterError: features of another shape.
-            ModelError: the model has no vertex network, the graph fails, or an answer is not
-                finite or of another shape.
-        """
-        return self._answers("vertex_features", features, budget)
-
-    def face_correction(
-        self, features: Float[np.ndarray, "N K"], budget: float
-    ) -> Float32[np.ndarray, "N 1"]:
-        """Return lengths along the normals of faces, in [−budget, budget].
-
-        Raises:
-            ParameterError: features of another shape.
-            ModelError: the model has no face network, the graph fails, or an answer is not finite
-                or of another shape.
-        """
-        return self._answers("face_features", features, budget)
-
-    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float32[np.ndarray, "N 1"]:
-        """Return the sharpness of edges.
-
-        Raises:
-            ParameterError: features of another shape.
-            ModelError: the model has no sharpness network, the graph fails, or an answer is not
-                finite or of another shape.
-        """
-        return self._answers("sharpness_features", features, 1.0)
-
-    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> Float32[np.ndarray, "N A"]:
-        """Run a network of directed edges: that which reads the input ``given``.
+        Args:
+            given: "features", or another of `networks`.
+            rows: what it reads.
+            budget: dimensionless; read by format 1 alone.
 
         Raises:
             ParameterError: rows of another shape.
             ModelError: the model has no such network, the graph fails, or an answer is not finite
                 or of another shape.
         """
-        return self._answers(given, rows, 1.0)
-
-    def _answers(self, given: str, features: np.ndarray, budget: float) -> np.ndarray:
         network = self._networks.get(given)
         if network is None:
             raise ModelError(self.name, expected=f"a network that reads {given}", found="none")
-        if features.ndim != 2 or features.shape[1] != network.columns:
+        if rows.ndim != 2 or rows.shape[1] != network.columns:
             expected = f"an array of shape (N, {network.columns})"
-            raise ParameterError(given, features.shape, expected=expected)
+            raise ParameterError(given, rows.shape, expected=expected)
         session, inputs = self._session(), self._unread_inputs(budget)
-        answers = np.empty((len(features), network.answer_columns), dtype=np.float32)
-        for start in range(0, len(features), CHUNK_ROWS):
-            chunk = features[start : start + CHUNK_ROWS]
+        answers = np.empty((len(rows), network.answer_columns), dtype=np.float32)
+        for start in range(0, len(rows), CHUNK_ROWS):
+            chunk = rows[start : start + CHUNK_ROWS]
             inputs[given] = self._padded(network, chunk)
             answer = self._run(session, network.answer, inputs)
             if answer.shape != (len(inputs[given]), network.answer_columns):

@@ -19,11 +19,10 @@ from pns_common.schemes.base_scheme import BaseScheme
 
 @dataclass(frozen=True, eq=False)
 class EdgeMeasures:
-    """Length h, x = 1 − n1 · n2 and signed sine of every edge; x and sine 0 unless interior."""
+    """Length h and x = 1 − n1 · n2 of every edge; x is 0 unless that is interior."""
 
     lengths: Float[np.ndarray, " E"]
     jumps: Float[np.ndarray, " E"]
-    bends: Float[np.ndarray, " E"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class RingMeasures:
 
     Attributes:
         fields: (V, 4) area-weighted mean normal, and umbrella height.
-        means: (V, 14) means over spokes and neighbours.
+        means: (V, 5) means over spokes.
         valence: (V,) number of edges.
     """
 
@@ -99,10 +98,10 @@ class Level:
     def edges(self) -> EdgeMeasures:
         """Lengths and turns of the edges."""
         mesh, count = self.topology, len(self.topology.edges)
-        made = EdgeMeasures(np.empty(count), np.empty(count), np.empty(count))
+        made = EdgeMeasures(np.empty(count), np.empty(count))
         of_corners = mesh.corners, mesh.face_of_corner
         read = self.points, self.normals, *of_corners, mesh.edges, mesh.half_edges, mesh.edge_class
-        to = made.lengths, made.jumps, made.bends
+        to = made.lengths, made.jumps
         self.blocks.run(count, lambda begin, end: measures.measure_edges(*read, begin, end, *to))
         return made
 
@@ -125,19 +124,12 @@ class Level:
         valence = np.empty(count, dtype=np.int32)
         spokes = self.points, mesh.edges, mesh.edge_reach
         at_faces = mesh.corners, mesh.face_of_corner, mesh.corner_reach, self.faces[1]
-        at_edges = self.edges.jumps, self.edges.bends, mesh.sharp_count
 
         def around(begin: int, end: int) -> None:
             measures.mean_normals(*at_faces, begin, end, fields)
-            measures.mean_spokes(*spokes, *at_edges, begin, end, means, valence, fields)
+            measures.mean_spokes(*spokes, mesh.sharp_count, begin, end, means, valence, fields)
 
         owners.run(count, around)
-        owners.run(
-            count,
-            lambda begin, end: measures.mean_neighbours(
-                *spokes, fields, valence, begin, end, means
-            ),
-        )
         # Nothing else reads the areas: an eighth of all memory.
         vars(self)["faces"] = self.normals, NO_AREAS
         return RingMeasures(fields, means, valence)

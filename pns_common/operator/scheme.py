@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pkgutil import resolve_name
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -15,12 +15,13 @@ from jaxtyping import Float, Integer
 from pns_common.errors import MeshError, ModelError, ParameterError
 from pns_common.mesh.creases import NO_CREASES, Creases, chosen_creases
 from pns_common.mesh.mesh import Mesh
-from pns_common.model.card import DIRECTED_FORMAT, PAPER_FORMAT
+from pns_common.model.card import PAPER_FORMAT
 from pns_common.model.features import FEATURE_SETS
 from pns_common.model.file import COMPANIONS, companion_of, load_model
-from pns_common.model.session import DirectedModel, Model, PolygonModel, heads_of, networks
+from pns_common.model.session import Model, heads_of, networks
 from pns_common.operator.directed import DirectedNetworks
-from pns_common.operator.formula import DirectedRule, Rule
+from pns_common.operator.formula import Additions, DirectedRule, PaperRule
+from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_number
 from pns_common.scheme_names import BASE_SCHEMES
@@ -50,7 +51,7 @@ class Scheme:
 
     name: str
     base: BaseScheme = field(default=LOOP, repr=False)
-    rule: Rule | DirectedRule | None = field(default=None, repr=False)
+    rule: Callable[[Level], Additions] | None = field(default=None, repr=False)
     learned_levels: int | None = 0
     creases: Creases = field(default=NO_CREASES, repr=False)
     for_polygons: Callable[[], Scheme] | None = field(default=None, repr=False)
@@ -145,79 +146,20 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     if not (is_number(budget) and budget >= 0):
         raise ParameterError("budget", budget, expected="a finite number ≥ 0")
     budget = float(budget)
-    named = {"budget": budget, "model": model.name, "model_hash": model.hash}
-    if card.format == DIRECTED_FORMAT:
-        return _directed_scheme(model, budget, named, companion)
-    rule = Rule(
-        partial(_edges_at_unit_budget, model),
-        FEATURE_SETS[card.features],
-        card.orientation == "symmetric",
-        card.gate_sharpness,
-        budget,
-        feature_type=getattr(model, "feature_type", np.float64),
-    )
+    named: dict[str, Any] = {"budget": budget, "model": model.name, "model_hash": model.hash}
     if card.format == PAPER_FORMAT:
-        return Scheme("pns", rule=rule, learned_levels=None, **named)  # type: ignore[arg-type]
+        network = partial(_run, model, networks(card)[0].given)
+        seen, symmetric = FEATURE_SETS[card.features], card.orientation == "symmetric"
+        kind = getattr(model, "feature_type", np.float64)
+        rule = PaperRule(network, seen, symmetric, card.gate_sharpness, budget, kind)
+        return Scheme("pns", rule=rule, learned_levels=None, **named)
     if card.base not in BASES:
         raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
-    learned = replace(
-        rule,
-        vertex_network=partial(_vertices_at_unit_budget, model),
-        vertex_gate_sharpness=_given(model, "vertex_gate_sharpness"),
-        prior_strength=_given(model, "prior_strength"),
-        curve_strength=_given(model, "boundary_strength"),
-        network_scale=_given(model, "network_scale"),
-        fold_angle=_given(model, "fold_angle"),
-    )
-    if card.face_features is not None:
-        learned = replace(learned, face_network=partial(_faces_at_unit_budget, model))
-    creases = NO_CREASES
-    if card.sharpness_features is not None:
-        learned = replace(learned, sharpness_network=partial(_sharpness, model))
-        if budget > 0 and card.sharpness_levels:
-            creases = Creases(learned=True, levels=card.sharpness_levels)
-    return Scheme(
-        "pns",
-        BASES[card.base],
-        learned,
-        learned_levels=1,
-        creases=creases,
-        for_polygons=companion,
-        **named,  # type: ignore[arg-type]
-    )
-
-
-def _directed_scheme(
-    model: Model,
-    budget: float,
-    named: dict[str, Any],
-    companion: Callable[[], Scheme] | None,
-) -> Scheme:
-    """Return the scheme of a model of directed edges."""
-    card = model.card
-    if card.base not in BASES:
-        raise ModelError(model.name, expected=f"a base of {sorted(BASES)}", found=repr(card.base))
-    encoder, *rounds, heads = (partial(_run, model, each.given) for each in networks(card))
     levels = int(_given(model, "sharpness_levels"))
     return Scheme(
         "pns",
         BASES[card.base],
-        DirectedRule(
-            DirectedNetworks(
-                encoder,
-                tuple(rounds),
-                heads,
-                int(_given(model, "width")),
-                heads_of(card),
-                getattr(model, "feature_type", np.float64),
-            ),
-            card.gate_sharpness,
-            _given(model, "vertex_gate_sharpness"),
-            budget,
-            _given(model, "boundary_strength"),
-            _given(model, "network_scale"),
-            _given(model, "fold_angle"),
-        ),
+        _directed_rule(model, budget),
         learned_levels=1,
         creases=Creases(learned=True, levels=levels) if budget > 0 and levels else NO_CREASES,
         for_polygons=companion,
@@ -225,43 +167,37 @@ def _directed_scheme(
     )
 
 
+def _directed_rule(model: Model, budget: float) -> DirectedRule:
+    """Return the rule of a model of directed edges."""
+    card = model.card
+    encoder, *rounds, heads = (partial(_run, model, each.given) for each in networks(card))
+    width, kind = int(_given(model, "width")), getattr(model, "feature_type", np.float64)
+    return DirectedRule(
+        DirectedNetworks(encoder, tuple(rounds), heads, width, heads_of(card), kind),
+        card.gate_sharpness,
+        _given(model, "vertex_gate_sharpness"),
+        budget,
+        _given(model, "boundary_strength"),
+        _given(model, "network_scale"),
+        _given(model, "fold_angle"),
+    )
+
+
+# Functions of the module, so that a scheme can be sent to another process. At unit budget, scaled
+# in float64 afterwards, so that one file serves every C / R exactly.
+
+
 def _run(model: Model, given: str, rows: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N A"]:
-    return cast(DirectedModel, model).run(given, rows)
-
-
-def _given(model: Model, name: str) -> float:
-    """Return a number of a card of format 4. Raises ModelError if the card has none."""
-    value = getattr(model.card, name)
-    if value is None:
-        raise ModelError(model.name, expected=f"{name} on a card of format 4", found="none")
-    return float(value)
-
-
-# At unit budget, scaled in float64 afterwards, so that one file serves every C / R exactly.
-# Functions of the module, so that a scheme can be sent to another process.
-
-
-def _edges_at_unit_budget(
-    model: Model, features: Float[np.ndarray, "N K"]
-) -> Float[np.ndarray, "N 3"]:
-    return model(features, 1.0)
-
-
-def _vertices_at_unit_budget(
-    model: Model, features: Float[np.ndarray, "N K"]
-) -> Float[np.ndarray, "N 3"]:
-    return model.vertex_correction(features, 1.0)
-
-
-def _faces_at_unit_budget(
-    model: Model, features: Float[np.ndarray, "N K"]
-) -> Float[np.ndarray, "N 1"]:
-    return cast(PolygonModel, model).face_correction(features, 1.0)
+    return model.run(given, rows)
 
 
 def _of_companion(model: Model, budget: float | None) -> Scheme:
     return pns(companion_of(model), budget)
 
 
-def _sharpness(model: Model, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
-    return model.sharpness(features)
+def _given(model: Model, name: str) -> float:
+    """Return a number of a card of format 5. Raises ModelError if the card has none."""
+    value = getattr(model.card, name)
+    if value is None:
+        raise ModelError(model.name, expected=f"{name} on a card of format 5", found="none")
+    return float(value)

@@ -101,12 +101,8 @@ class ModelEntry(BaseModel):
     orientation: str = Field(examples=["symmetric"])
     budget: float = Field(description="C that it was trained at, and the default of `budget`")
     gate_sharpness: float = Field(description="c of the gate")
-    vertex_features: str | None = Field(
-        description="feature set of old vertices; null where Loop's rule places them"
-    )
-    vertex_gate_sharpness: float | None = Field(description="c of the old vertices' gate")
+    vertex_gate_sharpness: float | None = Field(description="c_v of the gate; null in format 1")
     base: str | None = Field(description="base scheme; null in format 1, which has Loop")
-    prior_strength: float | None = Field(description="s of the prior; null in format 1")
     boundary_strength: float | None = Field(
         description="strength of the prior along boundaries and creases; null in format 1"
     )
@@ -119,14 +115,8 @@ class ModelEntry(BaseModel):
     sharpness_levels: int | None = Field(
         description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
     )
-    face_features: str | None = Field(
-        description="feature set of the vertices inside polygons; null where faces are triangles"
-    )
-    sharpness_features: str | None = Field(
-        description="feature set of a network for sharpness alone; null without one"
-    )
-    width: int | None = Field(description="numbers in a state of format 5; null in others")
-    rounds: int | None = Field(description="rounds of messages of format 5; null in others")
+    width: int | None = Field(description="numbers in a state; null in format 1")
+    rounds: int | None = Field(description="rounds of messages; null in format 1")
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")
 

@@ -11,7 +11,6 @@ from export.model_file import RECORDED, checkpoint_card
 from export.run import FILE_OF_RECIPE
 from pns_common import load_model, pns
 from pns_common.model.file import DEFAULT_MODEL, bundled_models
-from tests.support.recipes import tiny
 from train.data.datasets import ridge_held_out
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import fit
@@ -19,7 +18,8 @@ from train.metrics.card import MEASURES, card_metrics
 from train.metrics.envelope import envelope_limit
 from train.metrics.one_step import improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.from_recipe import initial_network
+from train.models.from_recipe import initial_directed, initial_network
+from train.models.recipe import of_length
 from train.models.recipes import RECIPES, paper, signed
 from train.models.torch_model import recipe_model
 
@@ -120,7 +120,7 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
     """The way of the bundled files, in a few steps: train, measure, keep, export."""
     files = []
     for number in range(2):
-        recipe = tiny(signed(3))
+        recipe = of_length(signed(3), 4)
         network = fit(recipe, lambda done, loss: None).network
         metrics = {"ridge-held-out": {"distance": {"percent": 1.0}}}
         path = tmp_path / f"{number}.safetensors"
@@ -130,12 +130,15 @@ def test_a_recipe_makes_the_same_file_twice(tmp_path):
     assert files[0] == files[1]
 
 
-# The default was trained in stages, which its card lists and no recipe runs.
-@pytest.mark.parametrize("name", sorted(set(BY_MODEL) - {"general"}))
+def untrained(recipe):
+    return initial_network(recipe) if recipe.directed is None else initial_directed(recipe)
+
+
+@each_model
 def test_card_holds_the_recipe_as_it_stands(name):
     training = load_model(name).card.training
     recipe = recipe_on_card(training)
-    checkpoint = Checkpoint(recipe, initial_network(recipe), {}, training["machine"])
+    checkpoint = Checkpoint(recipe, untrained(recipe), {}, training["machine"])
     assert as_json(checkpoint_card(checkpoint).training) == as_json(training)
 
 

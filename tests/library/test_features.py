@@ -3,40 +3,34 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh
 from pns_common.mesh.topology import build_topology
-from pns_common.model.card import EDGE_FEATURES, VERTEX_FEATURES
+from pns_common.model.card import EDGE_FEATURES
 from pns_common.model.features import (
     EDGE_GROUPS,
     FEATURE_SETS,
     HALF_TURN,
     MIRROR,
-    RING_10,
-    RING_FEATURE_SETS,
-    SIGNED_18,
     TURN_OVER,
     Feature,
     FeatureSet,
     symmetries,
 )
-from pns_common.operator.formula import Rule, edge_inputs, vertex_inputs
+from pns_common.operator.formula import PaperRule, edge_inputs
 from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
-from pns_common.schemes import CATMULL_CLARK, LOOP
+from pns_common.schemes import LOOP
 from tests.support.meshes import bumpy_sphere
 
-SETS = {**FEATURE_SETS, **RING_FEATURE_SETS}
 
-
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", FEATURE_SETS)
 def test_the_symmetries_are_a_group_of_involutions(name):
-    group, declared = SETS[name].symmetries, SETS[name].features
+    group, declared = FEATURE_SETS[name].symmetries, FEATURE_SETS[name].features
     elements = list(zip(group.order, group.signs, group.local, strict=True))
     known = {(tuple(o), tuple(s), tuple(d)) for o, s, d in elements}
-    count = SETS[name].count
-    assert {**EDGE_FEATURES, **VERTEX_FEATURES}[name] == count == int(name.partition("-")[2])
+    count = FEATURE_SETS[name].count
+    assert EDGE_FEATURES[name] == count == int(name.partition("-")[2])
     np.testing.assert_array_equal(elements[0][0], np.arange(count))
-    size = 2 if name == "ring-10" else 8 if any(f.turn_over < 0 for f in declared) else 4
+    size = 8 if any(f.turn_over < 0 for f in declared) else 4
     assert len(known) == size
     phi = np.random.default_rng(0).standard_normal(count)
     for order, signs, local in elements:
@@ -66,7 +60,7 @@ def test_rotations_of_the_frame_keep_its_orientation_and_mirrors_turn_it():
 def edges_of(points, faces, name):
     """The stencil's features and frames at every edge of a closed mesh, by its ends."""
     level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
-    rule = Rule(lambda phi: phi[:, :3], FEATURE_SETS[name], True, 1.0, 1.0)
+    rule = PaperRule(lambda phi: phi[:, :3], FEATURE_SETS[name], True, 1.0, 1.0)
     at = edge_inputs(level, rule, level.topology.interior)
     keys = level.topology.edges[at.rows].astype(int)
     return {
@@ -129,17 +123,13 @@ COMPOSED = [
 
 
 @pytest.mark.parametrize("groups", COMPOSED, ids=lambda groups: "-".join(g.name for g in groups))
-@pytest.mark.parametrize("polygons", [False, True])
-def test_a_set_of_any_groups_has_their_columns_and_no_others(groups, polygons):
+def test_a_set_of_any_groups_has_their_columns_and_no_others(groups):
     """Also where a set is as wide as another one, or narrower than a group of it."""
     points, faces = bumpy_sphere()
-    mesh = Mesh(points, [*faces[1:], [*faces[0]]])
-    faces = (mesh.corners, mesh.offsets) if polygons else mesh.faces
-    base = CATMULL_CLARK if polygons else LOOP
-    level = Level(points, build_topology(faces, len(points)), base, 1.0, Blocks())
+    level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
 
     def columns(seen):
-        rule = Rule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
+        rule = PaperRule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
         return edge_inputs(level, rule, level.topology.interior).features
 
     every = FeatureSet("every", EDGE_GROUPS, (HALF_TURN,))
@@ -154,19 +144,3 @@ def test_features_keep_their_limits():
     rows = np.array([phi for phi, _ in edges_of(points, faces, "signed-18").values()])
     limits = [feature.limit for feature in FEATURE_SETS["signed-18"].features]
     assert (np.abs(rows).max(axis=0) <= limits).all()
-
-
-def test_rings_turned_over_sign_the_features():
-    points, faces = bumpy_sphere()
-    rule = Rule(lambda phi: phi[:, :3], SIGNED_18, True, 1.0, 1.0)
-    at = []
-    for turned in (faces, faces[:, ::-1]):
-        level = Level(points, build_topology(turned, len(points)), LOOP, 1.0, Blocks())
-        at.append(vertex_inputs(level, rule, np.arange(len(points))))
-    group = RING_10.symmetries
-    signed = group.signs[1] * at[0].features[:, group.order[1]]
-    np.testing.assert_allclose(at[1].features, signed, atol=1e-13)
-    basis = at[0].basis.reshape(-1, 3, 3) * group.local[1][:, None]
-    np.testing.assert_allclose(at[1].basis.reshape(-1, 3, 3), basis, atol=1e-13)
-    limits = [feature.limit for feature in RING_10.features]
-    assert (np.abs(at[0].features).max(axis=0) <= limits).all()

@@ -12,7 +12,7 @@ from pns_common.mesh.topology import split_triangles
 from pns_common.model.file import bundled_models
 from pns_common.schemes.base_scheme import BaseScheme
 from tests.support.meshes import bumpy_sphere, grid
-from tests.support.networks import Float64Model, default_model, random_layers, sharpening_model
+from tests.support.networks import Float64Model, default_model, random_layers
 from tests.support.polygons import mixed_cube
 
 
@@ -42,23 +42,21 @@ def test_each_number_of_a_card_reaches_its_place_in_the_rule():
     numbers = {
         "gate_sharpness": 3.0,
         "vertex_gate_sharpness": 5.0,
-        "prior_strength": 0.7,
         "boundary_strength": 0.6,
         "network_scale": 0.3,
         "fold_angle": 60.0,
     }
-    scheme = pns(sharpening_model(0, **numbers, sharpness_levels=3), 4)
+    scheme = pns(default_model(0, **numbers, sharpness_levels=3), 4)
     rule = scheme.rule
     named = {name: getattr(rule, name) for name in numbers if name != "boundary_strength"}
     assert named | {"boundary_strength": rule.curve_strength} == numbers
-    assert (rule.budget, rule.seen.name, rule.symmetric) == (4.0, "signed-18", True)
+    assert (rule.budget, rule.networks.width, len(rule.networks.rounds)) == (4.0, 8, 2)
     assert (scheme.learned_levels, scheme.creases.levels) == (1, 3)
 
 
-def test_the_papers_model_acts_at_every_level_without_a_prior():
+def test_the_papers_model_acts_at_every_level_and_the_default_once():
     scheme = pns(Float64Model(random_layers(0)))
     assert scheme.acts_at(15)
-    assert (scheme.rule.prior_strength, scheme.rule.vertex_network) == (None, None)
     once = pns(default_model())
     assert [once.acts_at(level) for level in range(3)] == [True, False, False]
     assert not loop().acts_at(0)
@@ -69,13 +67,9 @@ def test_networks_are_asked_at_a_budget_of_one():
     asked = []
 
     class Asked(Float64Model):
-        card = default_model().card
-
-        def __call__(self, features, budget):
+        def run(self, given, rows, budget=1.0):
             asked.append(budget)
-            return np.zeros((len(features), 3))
-
-        vertex_correction = __call__
+            return np.zeros((len(rows), 3))
 
     refine(Mesh(*bumpy_sphere()), pns(Asked(random_layers(0)), 7.0), 1)
     assert set(asked) == {1.0}

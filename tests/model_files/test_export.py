@@ -13,28 +13,20 @@ import torch
 from typer.testing import CliRunner
 
 import export.run
+from export.directed_graph import directed_bytes
 from export.model_file import export_model, write_model
 from export.onnx_graph import OPSET, model_bytes
-from export.parity import BUDGETS, TOLERANCE, ParityError, check_parity, check_sharpness
+from export.parity import BUDGETS, TOLERANCE, ParityError, check_directed, check_parity
 from pns_common import ModelError
-from pns_common.model.features import FACE_FEATURE_SETS, FEATURE_SETS, RING_FEATURE_SETS
 from pns_common.model.file import ALLOWED_OPERATORS, BUNDLED, load_model, model_from_bytes
+from tests.support.directed import random_network
 from tests.support.networks import CARD, DEFAULT_CARD
 from train.metrics.card import TO_LIMIT
 from train.metrics.one_step import Improvement
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from train.models.from_recipe import (
-    initial_network,
-    initial_networks,
-    initial_sharpness_network,
-    initial_vertex_network,
-)
-from train.models.networks import BoundedNet, SharpNet
+from train.models.from_recipe import initial_directed, initial_network
+from train.models.networks import BoundedNet
 from train.models.recipes import general, general_quad, paper
-from train.models.tied import TiedNet
-
-EDGES, VERTICES = FEATURE_SETS["signed-18"].symmetries, RING_FEATURE_SETS["ring-10"].symmetries
-SINGLE = 2e-6
 
 
 def dense(activation="gelu", scale=1.0, seed=0):
@@ -43,41 +35,6 @@ def dense(activation="gelu", scale=1.0, seed=0):
     with torch.no_grad():
         network.linear_layers[-1].weight *= scale
     return network
-
-
-def tied(group, copies, seed=0, scale=3.0):
-    """A network with tied random weights."""
-    network = TiedNet(group, copies, "silu", torch.Generator().manual_seed(seed))
-    with torch.no_grad():
-        last = network.linear_layers[-1]
-        last.weight = torch.randn(last.weight.shape, generator=torch.Generator().manual_seed(seed))
-        last.weight = last.weight * scale / last.weight.shape[1] ** 0.5
-    return network
-
-
-def two_networks():
-    return tied(EDGES, (4, 4)), tied(VERTICES, (8, 8), seed=1)
-
-
-def two_networks_bytes():
-    edges, vertices = two_networks()
-    return model_bytes(edges, DEFAULT_CARD, vertices)
-
-
-def test_a_file_of_three_networks_says_what_each_says(tmp_path):
-    edges, vertices = two_networks()
-    sharp = SharpNet(53, (16,), "silu", torch.Generator().manual_seed(0))
-    card = replace(DEFAULT_CARD, sharpness_features="crease-53")
-    path = tmp_path / "three.onnx"
-    write_model(edges, card, path, vertex_network=vertices, sharpness_network=sharp)
-    model, psi = load_model(path), np.random.default_rng(0).random((5000, 53))
-    with torch.no_grad():
-        expected = torch.sigmoid(sharp(torch.from_numpy(psi).float())).numpy()
-    np.testing.assert_allclose(model.sharpness(psi), expected, atol=SINGLE)
-    with torch.no_grad():
-        sharp.linear_layers[0].bias += 1e-2
-    with pytest.raises(ParityError):
-        check_sharpness(model, sharp)
 
 
 @pytest.mark.parametrize("activation", ["gelu", "silu", "tanh"])
@@ -91,43 +48,25 @@ def test_a_file_says_what_the_network_says(activation, scale):
         assert parity.length > 1 - TOLERANCE
 
 
-def test_a_file_of_two_networks_says_what_both_say():
-    edges, vertices = two_networks()
-    model = model_from_bytes(two_networks_bytes(), "two")
-    parity = check_parity(model, edges, vertex_network=vertices)
-    assert parity.difference <= TOLERANCE
+@pytest.mark.parametrize("base", ["loop", "catmull-clark"])
+def test_a_file_of_directed_edges_says_what_each_network_says(base):
+    network = random_network(0, faces=base != "loop").float()
+    model = model_from_bytes(directed_bytes(network, replace(DEFAULT_CARD, base=base)), "directed")
+    assert check_directed(model, network).difference <= TOLERANCE
     with torch.no_grad():
-        vertices.linear_layers[0].parametrizations.bias.original += 1e-3
+        network.heads.parametrizations.bias.original += 1e-3
     with pytest.raises(ParityError):
-        check_parity(model, edges, vertex_network=vertices)
-    with pytest.raises(ModelError, match="vertex features ring-10"):
-        check_parity(model, edges)
+        check_directed(model, network)
 
 
-@pytest.mark.parametrize("which", ["edges", "vertices"])
-def test_answers_of_a_file_turn_with_the_features(which):
-    model = model_from_bytes(two_networks_bytes(), "tied")
-    ask, group = (model, EDGES) if which == "edges" else (model.vertex_correction, VERTICES)
-    rows = np.random.default_rng(0).uniform(-1, 1, (500, group.order.shape[1]))
-    answers = ask(rows, 1.0)
-    assert np.abs(answers).max() > 0.1
-    for order, signs, local in zip(group.order, group.signs, group.local, strict=True):
-        np.testing.assert_allclose(ask(rows[:, order] * signs, 1.0), answers * local, atol=SINGLE)
-
-
-def test_tied_weights_are_dense_matrices_in_the_file():
-    graph = onnx.load_from_string(two_networks_bytes()).graph
-    shapes = {tensor.name: list(tensor.dims) for tensor in graph.initializer}
-    assert [shapes[f"weight_{i}"] for i in range(3)] == [[32, 18], [32, 32], [3, 32]]
-    assert [shapes[f"vertex_weight_{i}"] for i in range(3)] == [[16, 10], [16, 16], [3, 16]]
-    assert {node.op_type for node in graph.node} == {
-        *("Gemm", "Sigmoid", "Mul", "MatMul", "Max", "Sqrt", "Div"),
-    }
-
-
-def test_the_same_networks_give_the_same_bytes_and_nothing_of_this_machine():
-    assert two_networks_bytes() == two_networks_bytes()
-    proto = onnx.load_from_string(two_networks_bytes())
+@pytest.mark.parametrize(
+    "made",
+    [lambda: model_bytes(dense(), CARD), lambda: directed_bytes(random_network(0), DEFAULT_CARD)],
+    ids=["1", "5"],
+)
+def test_the_same_networks_give_the_same_bytes_and_nothing_of_this_machine(made):
+    assert made() == made()
+    proto = onnx.load_from_string(made())
     assert [(entry.domain, entry.version) for entry in proto.opset_import] == [("", OPSET)]
     assert {node.op_type for node in proto.graph.node} <= ALLOWED_OPERATORS
     assert not proto.producer_version + proto.doc_string
@@ -144,12 +83,11 @@ def test_onnxruntime_computes_an_activation_in_one_operator(tmp_path, activation
     assert operators.count(fused) == 2
 
 
-@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("version", [2, 4])
 def test_no_file_of_a_retired_format_is_written(tmp_path, version):
-    edges, vertices = two_networks()
     path = tmp_path / "old.onnx"
-    with pytest.raises(ModelError, match=f"format {version}, which was never released"):
-        write_model(edges, replace(DEFAULT_CARD, format=version), path, vertex_network=vertices)
+    with pytest.raises(ModelError, match=f"format {version}, which is not read any more"):
+        write_model(dense(), replace(CARD, format=version), path)
     assert not path.exists()
 
 
@@ -160,9 +98,7 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
         other.linear_layers[-1].bias += damage
     path = tmp_path / "model.onnx"
     path.write_bytes(b"the old file")
-    monkeypatch.setattr(
-        "export.model_file.model_bytes", lambda _, card, *rest: model_bytes(other, card)
-    )
+    monkeypatch.setattr("export.model_file.model_bytes", lambda _, card: model_bytes(other, card))
     with pytest.raises((ParityError, ModelError)) as caught:
         write_model(network, CARD, path)
     if isinstance(caught.value, ParityError):
@@ -172,12 +108,15 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
     assert path.read_bytes() == b"the old file"
 
 
-@pytest.mark.parametrize("recipe", [paper(4), general(4)], ids=["paper", "general"])
+@pytest.mark.parametrize(
+    "recipe", [paper(4), general(4), general_quad(4)], ids=lambda recipe: recipe.name
+)
 def test_a_card_holds_the_whole_recipe(tmp_path, recipe):
     metrics = {"ridge-held-out": {"distance": {"percent": 12.0}}}
-    made = initial_network, initial_vertex_network, initial_sharpness_network
-    network, *others = (initial(recipe) for initial in made)
-    checkpoint = Checkpoint(recipe, network, metrics, "machine", *others)
+    form = recipe.directed
+    network = (initial_network if form is None else initial_directed)(recipe)
+    save_checkpoint(tmp_path / "made", Checkpoint(recipe, network, metrics, "machine"))
+    checkpoint = load_checkpoint(tmp_path / "made")
     exported = export_model(checkpoint, tmp_path / "models" / "mine.onnx")
     model = load_model(tmp_path / "models" / "mine.onnx")
     assert model.hash == exported.sha256
@@ -188,14 +127,12 @@ def test_a_card_holds_the_whole_recipe(tmp_path, recipe):
         assert card.training[name] == getattr(recipe, name)
     assert card.metrics == metrics
     assert card.training["machine"] == "machine"
-    if recipe.scale_free is None:
-        assert card.format == 1
-    else:
-        form, rule = recipe.scale_free, recipe.vertex
-        names = ("prior_strength", "network_scale", "fold_angle", "sharpness_levels", "base")
+    assert card.format == (1 if form is None else 5)
+    if form is not None:
+        names = "base", "width", "rounds", "network_scale", "fold_angle", "sharpness_levels"
         assert all(getattr(card, name) == getattr(form, name) for name in names)
-        assert (card.format, card.vertex_features) == (4, rule.features)
-        assert card.vertex_gate_sharpness == rule.gate_sharpness
+        assert card.boundary_strength == form.curve_strength
+        assert card.training["hidden"] == form.hidden
 
 
 def test_the_command_runs_from_a_checkout_that_is_not_installed(tmp_path):
@@ -243,30 +180,3 @@ def test_a_bundled_model_is_measured_anew_and_keeps_its_networks(tmp_path, monke
     refused = CliRunner().invoke(export.run.app, ["--measure", "nothing"])
     assert refused.exit_code == 1
     assert "expected a model file" in refused.output
-
-
-def test_a_file_for_polygons_says_what_its_four_networks_say(tmp_path):
-    recipe = general_quad()
-    networks = initial_networks(recipe)
-    assert networks.face is not None
-    last = networks.face.linear_layers[-1]
-    with torch.no_grad():
-        weight = torch.randn(last.weight.shape, generator=torch.Generator().manual_seed(0))
-        last.weight = weight / 8
-    path, saved = tmp_path / "quads.onnx", tmp_path / "quads.safetensors"
-    parts = networks.vertex, networks.sharp, networks.face
-    save_checkpoint(saved, Checkpoint(recipe, networks.edge, {}, "a", *parts))
-    export_model(load_checkpoint(saved), path)
-    model, rows = load_model(path), np.random.default_rng(0).uniform(-1, 1, (500, 8))
-    with torch.no_grad():
-        expected = networks.face(torch.from_numpy(rows).float(), 3.0).numpy()
-    assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(model.face_correction(rows, 3.0), expected, atol=3 * SINGLE)
-    # Turned over, a face's normal changes its sign.
-    group = FACE_FEATURE_SETS["face-8"].symmetries
-    turned = model.face_correction(rows[:, group.order[1]] * group.signs[1], 3.0)
-    np.testing.assert_allclose(turned, -expected, atol=3 * SINGLE)
-    # Sharpness is taken over.
-    asked, bundled = np.random.default_rng(0).standard_normal((50, 53)), load_model("general-quad")
-    np.testing.assert_allclose(model.sharpness(asked), bundled.sharpness(asked), atol=1e-6)
-    assert not any(weight.requires_grad for weight in networks.sharp.parameters())

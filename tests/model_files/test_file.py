@@ -82,8 +82,7 @@ def test_bytes_that_are_no_onnx_file_are_refused(data):
     [
         (None, "0"),
         ("{", "Expecting"),
-        (card_text(format=2), "format 2, which was never released"),
-        (card_text(format=3), "format 3, which was never released"),
+        (card_text(format=4), "format 4, which is not read any more"),
         (card_text(features="paper-9"), "features 'paper-9'"),
         (card_text(surprise=1), "unknown fields surprise"),
     ],
@@ -236,13 +235,13 @@ def test_other_inputs_or_outputs_are_refused(inputs, outputs):
 
 
 def test_a_file_holds_the_networks_that_its_card_names():
-    two, one = default_model_bytes(), perceptron_bytes(random_layers(0), card=DEFAULT_CARD)
-    assert "vertex_features" in refused(one).expected
+    several, one = default_model_bytes(), perceptron_bytes(random_layers(0), card=DEFAULT_CARD)
+    assert "messages_1" in refused(one).expected
 
     def as_paper(proto):
         proto.metadata_props[0].value = card_text(features="signed-18", orientation="symmetric")
 
-    assert "vertex_features" in refused(changed(as_paper, two)).found
+    assert "messages_1" in refused(changed(as_paper, several)).found
 
 
 def two_wide(width):
@@ -345,7 +344,7 @@ def test_an_old_file_whose_weights_are_inputs_is_accepted():
         )
 
     model = model_from_bytes(changed(old, two_wide(4)), "old")
-    assert model(np.zeros((2, 5)), 1.0).shape == (2, 3)
+    assert model.run("features", np.zeros((2, 5))).shape == (2, 3)
 
 
 def test_answers_of_fewer_rows_are_refused():

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from onnx import TensorProto, helper
 
 from pns_common import ModelError, ParameterError
 from pns_common.model.file import model_from_bytes
-from pns_common.model.session import CHUNK_ROWS, CPU, Model
+from pns_common.model.session import CHUNK_ROWS, CPU, Model, networks
 from tests.support.networks import (
+    HIDDEN,
     default_model,
     default_model_bytes,
     float64_network,
@@ -37,41 +39,56 @@ def rows(count, width=5, seed=0):
 def test_answers_are_those_of_the_network_in_double_precision(budget):
     features = rows(700)
     expected = budget * float64_network(random_layers(0))(features)
-    answers = random_model(0)(features, budget)
+    answers = random_model(0).run("features", features, budget)
     assert answers.dtype == np.float32
     np.testing.assert_allclose(answers, expected, rtol=0, atol=2e-6 * budget)
     assert np.linalg.norm(answers, axis=1).max() <= budget * (1 + 1e-6)
 
 
-def test_each_network_answers_its_own_features():
-    model = default_model(3, scale=1.0)
-    edges, vertices = rows(50, 18), rows(50, 10)
-    for answers, features, seed in (
-        (model(edges, 1.0), edges, 3),
-        (model.vertex_correction(vertices, 1.0), vertices, 4),
-    ):
-        layers = random_layers(seed, (features.shape[1], 16, 3), 1.0)
-        np.testing.assert_allclose(answers, float64_network(layers)(features), atol=2e-6)
+def silu_network(layers):
+    """A perceptron with x σ(x) between layers, in double precision."""
+
+    def network(rows):
+        for number, (weight, bias) in enumerate(layers):
+            rows = rows @ weight + bias
+            if number < len(layers) - 1:
+                rows = rows / (1 + np.exp(-rows))
+        return rows
+
+    return network
+
+
+def test_each_network_answers_its_own_rows():
+    model = default_model(3)
+    for number, held in enumerate(networks(model.card)):
+        widths = [held.columns, *[HIDDEN] * (held.answer != "heads"), held.answer_columns]
+        given = rows(50, held.columns)
+        expected = silu_network(random_layers(3 + number, widths, 0.3))(given)
+        np.testing.assert_allclose(model.run(held.given, given), expected, atol=1e-5)
 
 
 def test_a_rows_bits_depend_on_nothing_but_the_row():
     """Not on how many rows there are, nor on where in a chunk it stands."""
-    for ask, width in ((random_model(0), 5), (default_model(0).vertex_correction, 10)):
-        features = rows(2 * CHUNK_ROWS + 17, width)
-        whole = ask(features, 1.0)
+    for model, given, width in (
+        (random_model(0), "features", 5),
+        (default_model(0), "messages_1", 48),
+    ):
+        features, ask = rows(2 * CHUNK_ROWS + 17, width), partial(model.run, given)
+        whole = ask(features)
         for count in (1, 2, 3, 5, 8, 15, 16, 17, 31, 100, CHUNK_ROWS - 1, CHUNK_ROWS + 1):
             for start in (0, 1, CHUNK_ROWS - 3, len(features) - count):
                 part = slice(start, start + count)
-                np.testing.assert_array_equal(ask(features[part], 1.0), whole[part])
-        assert ask(features[:0], 1.0).shape == (0, 3)
+                np.testing.assert_array_equal(ask(features[part]), whole[part])
+        assert len(ask(features[:0])) == 0
 
 
 def test_threads_share_a_model_and_change_nothing():
-    model, features = default_model(0), rows(3 * CHUNK_ROWS, 18)
-    whole = model(features, 1.0)
+    model, features = default_model(0), rows(3 * CHUNK_ROWS, 28)
+    ask = partial(model.run, "features")
+    whole = ask(features)
     starts = range(0, len(features), 1000)
     with ThreadPoolExecutor(4) as pool:
-        parts = list(pool.map(lambda start: model(features[start : start + 1000], 1.0), starts))
+        parts = list(pool.map(lambda start: ask(features[start : start + 1000]), starts))
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
@@ -93,8 +110,8 @@ def test_each_thread_has_a_session_of_its_own_and_keeps_it():
 
 @pytest.mark.parametrize(
     ("data", "width"),
-    [(perceptron_bytes(random_layers(0)), 5), (default_model_bytes(), 18)],
-    ids=["1", "4"],
+    [(perceptron_bytes(random_layers(0)), 5), (default_model_bytes(), 28)],
+    ids=["1", "5"],
 )
 def test_a_model_travels_to_another_process(data, width):
     model = model_from_bytes(data, "mine")
@@ -104,18 +121,19 @@ def test_a_model_travels_to_another_process(data, width):
         *("mine", model.hash, model.card, model.size, CPU),
     )
     features = rows(9, width)
-    np.testing.assert_array_equal(copy(features, 0.5), model(features, 0.5))
+    same = (each.run("features", features, 0.5) for each in (copy, model))
+    np.testing.assert_array_equal(*same)
 
 
-def test_a_model_without_a_vertex_network_says_so():
-    with pytest.raises(ModelError, match="vertex_features"):
-        random_model(0).vertex_correction(rows(1, 10), 1.0)
+def test_a_model_without_such_a_network_says_so():
+    with pytest.raises(ModelError, match="messages_1"):
+        random_model(0).run("messages_1", rows(1, 48))
 
 
 @pytest.mark.parametrize("shape", [(7, 4), (7, 1), (5,), (7, 5, 1)])
 def test_features_of_another_shape_are_refused(shape):
     with pytest.raises(ParameterError, match=r"shape \(N, 5\)"):
-        random_model(0)(np.zeros(shape), 1.0)
+        random_model(0).run("features", np.zeros(shape))
 
 
 @pytest.mark.parametrize("providers", [(), ("NoSuchExecutionProvider",)])
@@ -128,7 +146,7 @@ def test_answers_that_are_not_finite_are_refused():
     divide = node("Div", ["three", "zero"], ["correction"])
     model = model_from_bytes(model_bytes([*PASS, divide], CUT | {"zero": np.zeros(())}), "nan")
     with pytest.raises(ModelError, match="finite"):
-        model(rows(3), 1.0)
+        model.run("features", rows(3))
 
 
 def test_a_graph_that_breaks_off_is_refused():
@@ -144,7 +162,7 @@ def test_a_graph_that_breaks_off_is_refused():
     whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
     data = model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
     with pytest.raises(ModelError, match="runs to its end"):
-        model_from_bytes(data, "breaks")(rows(3), 1.0)
+        model_from_bytes(data, "breaks").run("features", rows(3))
 
 
 def test_answers_of_another_shape_are_refused():
@@ -157,9 +175,9 @@ def test_answers_of_another_shape_are_refused():
     ]
     weights = CUT | {"rows": np.array([CHUNK_ROWS]), "first": np.array([0])}
     model = model_from_bytes(model_bytes(nodes, weights), "longer")
-    assert model(rows(CHUNK_ROWS), 1.0).shape == (CHUNK_ROWS, 3)
+    assert model.run("features", rows(CHUNK_ROWS)).shape == (CHUNK_ROWS, 3)
     with pytest.raises(ModelError, match="a row for each"):
-        model(rows(3), 1.0)
+        model.run("features", rows(3))
 
 
 def test_onnxruntime_is_imported_with_the_first_model():

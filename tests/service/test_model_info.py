@@ -45,11 +45,11 @@ def test_models_are_compared_in_80_columns(
     assert all(len(line) <= 80 for line in lines)
     rows = {line.split()[0]: line.replace(" *", "").split()[1:] for line in lines[2:5]}
     percent = load_model("paper").card.metrics["ridge-held-out"]["distance_near"]["percent"]
-    assert rows["paper"][:5] == ["paper-5", "first-face", "no", "0.5", "10"]
-    assert rows["paper"][5] == f"{percent:+.1f}"
-    assert rows["vertices"] == ["signed-18", "symmetric", "yes", "0.25", "40", "–", "–", "–"]
+    assert rows["paper"][:4] == ["paper-5", "first-face", "0.5", "10"]
+    assert rows["paper"][4] == f"{percent:+.1f}"
+    assert rows["vertices"] == ["directed-28", "symmetric", "0.25", "40", "–", "–", "–"]
     # A metric that the card does not hold is a dash beside those that it does.
-    assert rows[long.name][5:] == ["+50.0", "+50.0", "–"]
+    assert rows[long.name][4:] == ["+50.0", "+50.0", "–"]
 
 
 def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,12 +60,12 @@ def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None
     assert any(line.startswith(f"{DEFAULT_MODEL} *") for line in lines)
 
 
-def test_a_vertex_rule_is_shown_where_there_is_one(
+def test_what_a_format_adds_is_shown_where_it_is(
     capsys: pytest.CaptureFixture[str], vertices: OnnxModel
 ) -> None:
     print_model(with_card(vertices, vertex_gate_sharpness=37.5))
     shown = capsys.readouterr().out
-    for value in ("ring-10", "37.5", "symmetric", "signed-18"):
+    for value in ("directed-28", "37.5", "symmetric"):
         assert value in shown
     print_model(load_model("paper"))
     assert "vertex" not in capsys.readouterr().out

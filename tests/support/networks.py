@@ -7,33 +7,25 @@ from itertools import pairwise
 import numpy as np
 from onnx import TensorProto, helper, numpy_helper
 
-from pns_common.model.card import (
-    CARD_KEY,
-    EDGE_FEATURES,
-    SHARPNESS_FEATURES,
-    VERTEX_FEATURES,
-    ModelCard,
-)
-from pns_common.model.features import FACE_8, RING_10, SIGNED_18
+from pns_common.model.card import CARD_KEY, ModelCard
 from pns_common.model.file import model_from_bytes
+from pns_common.model.session import networks
 
 PUBLISHED_BUDGET, PUBLISHED_GATE_SHARPNESS = 0.5, 10.0
 
 CARD = ModelCard(1, "paper-5", PUBLISHED_GATE_SHARPNESS, PUBLISHED_BUDGET, "first-face", {}, {})
 DEFAULT_CARD = ModelCard(
-    *(4, "signed-18", 1e6, 20.0, "symmetric", {}, {}),
+    *(5, "directed-28", 1e7, 10.0, "symmetric", {}, {}),
     base="loop",
-    vertex_features="ring-10",
-    vertex_gate_sharpness=1e3,
-    prior_strength=1.0,
+    vertex_gate_sharpness=1e4,
     boundary_strength=1.0,
-    network_scale=0.4,
-    fold_angle=75.0,
+    network_scale=0.3,
+    fold_angle=40.0,
     sharpness_levels=2,
+    width=8,
+    rounds=2,
 )
-
-
-POLYGON_CARD = replace(DEFAULT_CARD, base="catmull-clark", face_features="face-8")
+HIDDEN = 12
 
 
 def model_bytes(
@@ -68,52 +60,36 @@ def perceptron_bytes(layers, *, project=True, card=CARD):
     return model_bytes(nodes, weights, card=card, width=len(layers[0][0]))
 
 
-def two_perceptrons_bytes(edges, vertices, sharpness=None, *, card=DEFAULT_CARD):
-    """A file of format 4: one perceptron for edges, one for old vertices, one for sharpness."""
-    nodes, weights = perceptron(edges)
-    more_nodes, more_weights = perceptron(vertices, prefix="vertex_")
-    inputs = [
-        ("features", ["edges", len(edges[0][0])]),
-        ("budget", []),
-        ("vertex_features", ["vertices", len(vertices[0][0])]),
-    ]
-    outputs = [("correction", ["edges", 3]), ("vertex_correction", ["vertices", 3])]
-    nodes, weights = nodes + more_nodes, weights | more_weights
-    if sharpness is not None:
-        more_nodes, more_weights = perceptron(sharpness, prefix="sharpness_", answer="sigmoid")
-        nodes += [*more_nodes, helper.make_node("Identity", ["sharpness_answer"], ["sharpness"])]
-        weights |= more_weights
-        inputs.append(("sharpness_features", ["sharpened", len(sharpness[0][0])]))
-        outputs.append(("sharpness", ["sharpened", 1]))
-    return model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
+def directed_file(parts, card):
+    """A file of format 5: each network reads an input of its own, in the order of `networks`.
 
-
-def polygon_model(seed=0, scale=2.0, **changes):
-    """A model over Catmull–Clark with random weights; of scale 0, the prior alone."""
-    asked = {"features": 18, "vertex_features": 10, "face_features": 8}
-    nodes, weights, inputs, outputs = [], {}, [("budget", [])], []
-    for number, (given, width) in enumerate(asked.items()):
-        prefix, answers = given.removesuffix("features"), 1 if given == "face_features" else 3
-        layers = random_layers(seed + number, (width, 16, answers), scale)
-        more_nodes, more_weights = perceptron(layers, prefix=prefix)
-        nodes, weights = nodes + more_nodes, weights | more_weights
-        inputs.append((given, [f"{prefix}rows", width]))
-        outputs.append((f"{prefix}correction", [f"{prefix}rows", answers]))
-    card = replace(POLYGON_CARD, **changes)
-    data = model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs)
-    return model_from_bytes(data, "polygons")
-
-
-def perceptron(layers, *, project=True, prefix="", answer="correction"):
-    """Nodes and weights from the input ``features`` to the output ``correction``, prefixed.
-
-    With the answer "sigmoid" the output is ``answer``, the sigmoid of the last layer.
+    ``parts`` are lists of (weight (in, out), bias) pairs.
     """
+    nodes, weights, held = [], {}, networks(card)
+    for each, layers in zip(held, parts, strict=True):
+        value = each.given
+        for number, (weight, bias) in enumerate(layers):
+            name, last = f"{each.given}_{number}", number == len(layers) - 1
+            made = each.answer if last else f"{name}_sum"
+            weights |= {f"{name}_weight": weight, f"{name}_bias": bias}
+            nodes.append(
+                helper.make_node("Gemm", [value, f"{name}_weight", f"{name}_bias"], [made])
+            )
+            if not last:
+                value = f"{name}_silu"
+                nodes.append(helper.make_node("Sigmoid", [made], [f"{name}_gate"]))
+                nodes.append(helper.make_node("Mul", [made, f"{name}_gate"], [value]))
+    inputs = [(each.given, [f"{each.given}_rows", each.columns]) for each in held]
+    outputs = [(each.answer, [f"{each.given}_rows", each.answer_columns]) for each in held]
+    return model_bytes(nodes, weights, card=card, inputs=inputs, outputs=outputs, opset=17)
+
+
+def perceptron(layers, *, project=True):
+    """Nodes and weights from the input ``features`` to the output ``correction``."""
     nodes, weights, name = [], {}, "features"
 
     def add(operator, inputs, output, **attributes):
-        inputs = [i if i == "budget" else f"{prefix}{i}" for i in inputs]
-        nodes.append(helper.make_node(operator, inputs, [f"{prefix}{output}"], **attributes))
+        nodes.append(helper.make_node(operator, inputs, [output], **attributes))
         return output
 
     for number, (weight, bias) in enumerate(layers):
@@ -121,16 +97,13 @@ def perceptron(layers, *, project=True, prefix="", answer="correction"):
         name = add("Gemm", [name, f"w{number}", f"b{number}"], f"z{number}")
         if number < len(layers) - 1:
             name = add("Gelu", [name], f"g{number}")
-    if answer == "sigmoid":
-        add("Sigmoid", [name], "answer")
-        return nodes, {f"{prefix}{key}": value for key, value in weights.items()}
     if project:
         weights |= {"one": 1.0, "last": np.array([1])}
         add("ReduceL2", [name, "last"], "length", keepdims=1)
         add("Max", ["length", "one"], "divisor")
         name = add("Div", [name, "divisor"], "in_ball")
     add("Mul", [name, "budget"], "correction")
-    return nodes, {f"{prefix}{key}": value for key, value in weights.items()}
+    return nodes, weights
 
 
 def breaking_off_bytes():
@@ -161,26 +134,20 @@ def random_model(seed, scale=1.0):
     return model_from_bytes(perceptron_bytes(random_layers(seed, scale=scale)), "random")
 
 
-def default_model_bytes(seed=0, scale=2.0, **changes):
-    """A file of format 4 with random weights; of scale 0, the prior alone."""
-    edges = random_layers(seed, (EDGE_FEATURES["signed-18"], 16, 3), scale)
-    vertices = random_layers(seed + 1, (VERTEX_FEATURES["ring-10"], 16, 3), scale)
+def default_model_bytes(seed=0, scale=0.3, **changes):
+    """A file of format 5 with random weights, tied by nothing; of scale 0, flat."""
     card = replace(DEFAULT_CARD, **changes)
-    sharpness = None
-    if card.sharpness_features is not None:
-        widths = (SHARPNESS_FEATURES[card.sharpness_features], 16, 1)
-        sharpness = random_layers(seed + 2, widths, scale)
-    return two_perceptrons_bytes(edges, vertices, sharpness, card=card)
+    parts = []
+    for number, each in enumerate(networks(card)):
+        last = each.answer == "heads"
+        widths = [each.columns, *[HIDDEN] * (not last), each.answer_columns]
+        parts.append(random_layers(seed + number, widths, scale))
+    return directed_file(parts, card)
 
 
-def default_model(seed=0, scale=2.0, **changes):
-    """A model of format 4 with random weights; of scale 0, the prior alone."""
+def default_model(seed=0, scale=0.3, **changes):
+    """A model of format 5 with random weights; of scale 0, flat."""
     return model_from_bytes(default_model_bytes(seed, scale, **changes), "default")
-
-
-def sharpening_model(seed=0, scale=2.0, **changes):
-    """A model of format 4 with random weights, that also says how sharp edges are."""
-    return default_model(seed, scale, sharpness_features="crease-53", **changes)
 
 
 def huge_model(seed):
@@ -228,43 +195,5 @@ class Float64Model:
     def __init__(self, layers):
         self.network = float64_network(layers)
 
-    def __call__(self, features, budget):
-        return budget * self.network(features)
-
-    def vertex_correction(self, features, budget):
-        raise AssertionError("format 1 has no vertex network")
-
-    def sharpness(self, features):
-        raise AssertionError("format 1 has no sharpness network")
-
-
-class TiedPolygonModel:
-    """Networks in double precision with the symmetries of their features, by averaging."""
-
-    name, hash, card = "tied", "0" * 64, POLYGON_CARD
-
-    def __init__(self, seed):
-        self.networks = {
-            seen.name: (float64_network(random_layers(seed, (seen.count, 16, 3))), seen.symmetries)
-            for seen in (SIGNED_18, RING_10, FACE_8)
-        }
-
-    def _answers(self, name, features, budget):
-        network, group = self.networks[name]
-        turned = [
-            local * network(signs * features[:, order])
-            for order, signs, local in zip(group.order, group.signs, group.local, strict=True)
-        ]
-        return budget * np.mean(turned, axis=0)
-
-    def __call__(self, features, budget):
-        return self._answers("signed-18", features, budget)
-
-    def vertex_correction(self, features, budget):
-        return self._answers("ring-10", features, budget)
-
-    def sharpness(self, features):
-        raise AssertionError("the card names no sharpness network")
-
-    def face_correction(self, features, budget):
-        return self._answers("face-8", features, budget)[:, :1]
+    def run(self, given, rows, budget=1.0):
+        return budget * self.network(rows)

@@ -19,14 +19,8 @@ class ZeroModel:
     name: str = "zero"
     hash: str = "0" * 64
 
-    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
-        return np.zeros((len(features), 3))
-
-    def vertex_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
-        return np.zeros((len(features), 3))
-
-    def sharpness(self, features: np.ndarray) -> np.ndarray:
-        return np.zeros((len(features), 1))
+    def run(self, given: str, rows: np.ndarray, budget: float = 1.0) -> np.ndarray:
+        return np.zeros((len(rows), 3))
 
 
 class CountedModel(ZeroModel):
@@ -37,21 +31,3 @@ class CountedModel(ZeroModel):
     def __reduce__(self) -> tuple[object, ...]:
         CountedModel.pickled += 1
         return (ZeroModel, ())
-
-
-class Constant:
-    """A model whose networks say one number for edges, one for vertices, and one of sharpness."""
-
-    name, hash = "constant", "0" * 64
-
-    def __init__(self, card, edges, vertices, sharpness=0.0):
-        self.card, self.edges, self.vertices, self.sharp = card, edges, vertices, sharpness
-
-    def __call__(self, features, budget):
-        return np.full((len(features), 3), self.edges)
-
-    def vertex_correction(self, features, budget):
-        return np.full((len(features), 3), self.vertices)
-
-    def sharpness(self, features):
-        return np.full((len(features), 1), self.sharp)

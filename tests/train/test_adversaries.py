@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import train.reference as reference
+import train.directed_rule as oracle
 from pns_common import Mesh
 from tests.support.meshes import TETRAHEDRON, bent, bumpy_sphere, grid, rotation
 from train.certificates.adversary import (
@@ -19,12 +19,24 @@ from train.certificates.bodies import synthetic_bodies
 from train.certificates.displacement import bounded_displacement
 from train.certificates.gap_collapse import gap_attack
 from train.certificates.subject import subject_of_network
-from train.models.recipe import ScaleFree
+from train.models.recipe import DirectedForm
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
 
-FORM = ScaleFree("loop", 1.0, 0.0, 0.4, 75.0, 2)
-LOOSE = replace(FORM, network_scale=2.0, boundary_strength=1.0)
+FORM = DirectedForm(
+    base="loop",
+    width=4,
+    hidden=6,
+    rounds=2,
+    budget=20.0,
+    gate_sharpness=1e6,
+    vertex_gate_sharpness=1e3,
+    network_scale=0.4,
+    curve_strength=0.0,
+    fold_angle=75.0,
+    sharpness_levels=2,
+)
+LOOSE = replace(FORM, network_scale=2.0, curve_strength=1.0)
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
 MESHES = {
     "sphere": Mesh(*bumpy_sphere(0, subdivisions=0, bump=0.2)),
@@ -85,7 +97,7 @@ def test_a_smaller_budget_leaves_the_adversary_of_the_gap_a_wider_margin():
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize(("form", "loudness"), [(FORM, 1.0), (LOOSE, 100.0)])
 def test_no_search_over_weights_and_mesh_breaks_a_promise(goal, mesh, form, loudness):
-    worst = ascend(GOALS[goal], MESHES[mesh], form, 20.0, seed=0, steps=10, loudness=loudness)
+    worst = ascend(GOALS[goal], MESHES[mesh], form, seed=0, steps=10, loudness=loudness)
     for promise in ("turn", "displacement", "limit", "overshoot"):
         assert getattr(worst, promise) <= ALLOWED, (promise, worst)
 
@@ -93,17 +105,17 @@ def test_no_search_over_weights_and_mesh_breaks_a_promise(goal, mesh, form, loud
 @pytest.mark.parametrize("goal", GOALS)
 def test_the_searches_climb(goal):
     """From usual weights: a search that stands still proves nothing."""
-    assert ascend(GOALS[goal], MESHES["sphere"], FORM, 20.0, seed=0, steps=25).climbed > 0
+    assert ascend(GOALS[goal], MESHES["sphere"], FORM, seed=0, steps=25).climbed > 0
 
 
 def test_without_the_guard_the_same_search_folds_faces(monkeypatch):
-    monkeypatch.setattr(reference, "fold_guard", lambda faces, base, *rest: 0 * base[:, 0] + 1)
-    assert ascend(GOALS["fold"], MESHES["sphere"], LOOSE, 20.0, seed=0, steps=25).turn > 1
+    monkeypatch.setattr(oracle, "fold_guard", lambda faces, base, *rest: 0 * base[:, 0] + 1)
+    assert ascend(GOALS["fold"], MESHES["sphere"], LOOSE, seed=0, steps=25).turn > 1
 
 
 def test_without_the_projection_the_same_search_leaves_the_envelope(monkeypatch):
-    search = GOALS["limit distance"], MESHES["sphere"], FORM, 0.05
+    search = GOALS["limit distance"], MESHES["sphere"], replace(FORM, budget=0.05)
     held = ascend(*search, seed=0, steps=10)
     assert 0.9 < held.displacement <= ALLOWED
-    monkeypatch.setattr(reference, "shortened", lambda vectors, longest: vectors)
+    monkeypatch.setattr(oracle, "shortened", lambda vectors, longest: vectors)
     assert ascend(*search, seed=0, steps=10).displacement > 1.5

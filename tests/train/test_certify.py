@@ -165,13 +165,13 @@ def test_double_precision_is_the_same_network():
     layers = [(np.float32(weight), np.float32(bias)) for weight, bias in layers]
     rows = np.random.default_rng(1).standard_normal((50, 5))
     expected = 0.5 * float64_network(layers)(rows)
-    np.testing.assert_allclose(double(rows, 0.5), expected, atol=1e-14)
+    np.testing.assert_allclose(double.run("features", rows, 0.5), expected, atol=1e-14)
 
 
 def test_double_precision_of_the_paper_model():
     model, rows = load_model("paper"), sample_features(5)
     double = double_model(model, read_bytes("paper"))
-    apart = np.abs(model(rows[:2000], 1.0) - double(rows[:2000], 1.0)).max()
+    apart = np.abs(model.run("features", rows[:2000]) - double.run("features", rows[:2000])).max()
     assert 1e-9 < apart < 1e-5
 
 
@@ -189,7 +189,7 @@ def test_constants_and_casts_are_widened_too():
     double = double_model(model_from_bytes(data, "constants"), data)
     rows = np.random.default_rng(0).standard_normal((4, 5))
     expected = rows.sum(axis=1, keepdims=True) * np.float32([0.1, 0.2, 0.3]).astype(float)
-    widened = double(rows, 1.0)
+    widened = double.run("features", rows)
     assert widened.dtype == np.float64
     np.testing.assert_allclose(widened, expected * float(np.float32(1 / 3)), rtol=1e-14)
 

@@ -18,7 +18,7 @@ from train.fitting.trainer import fit
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.from_recipe import initial_directed
 from train.models.recipe import OnPairs, Recipe
-from train.models.recipes import directed
+from train.models.recipes import general
 
 SPLITS, LEVELS = 4, 2
 
@@ -32,7 +32,7 @@ def shaken(splits: int) -> Mesh:
 
 def short_recipe() -> Recipe:
     """Return the recipe with two steps on few pairs."""
-    made = directed(3)
+    made = general(3)
     assert isinstance(made.training, OnPairs)
     plan = msgspec.structs.replace(made.training, procedural=2, meshes=1, real=0.5)
     return replace(made, training=plan, steps=3)
@@ -53,14 +53,14 @@ def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_limit_without_a_network_is_loops() -> None:
     mesh = shaken(2)
-    form = directed(0).directed
+    form = general(0).directed
     assert form is not None
     made = ControlMesh(mesh, form).limit(None).points.numpy()
     assert np.abs(made - refine(mesh, loop(), LEVELS, limit=True).mesh.vertices).max() < 1e-12
 
 
 def test_training_sees_what_the_model_file_writes(tmp_path: Path) -> None:
-    mesh, recipe = shaken(2), directed(0)
+    mesh, recipe = shaken(2), general(0)
     assert recipe.directed is not None
     network = initial_directed(recipe)
     with torch.no_grad():

@@ -1,6 +1,5 @@
 """Networks: bounded for any weights, tied or averaged over the symmetries of what they read."""
 
-import copy
 import math
 from dataclasses import replace
 
@@ -11,18 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Mesh, ParameterError, pns
-from pns_common.model.features import FEATURE_SETS, RING_10
+from pns_common.model.features import DIRECTED_28, FEATURE_SETS
 from tests.support.control_points import refine
+from tests.support.directed import random_network
 from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds
-from tests.support.networks import DEFAULT_CARD
 from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
-from train.models.from_recipe import initial_network, initial_vertex_network
+from train.models.directed import MIRRORED
+from train.models.from_recipe import initial_network
 from train.models.networks import ACTIVATIONS, BoundedNet, unit_correction
-from train.models.recipe import one_step, scale_free_parts
-from train.models.recipes import general, paper, signed
-from train.models.tied import TiedNet, product
-from train.models.torch_model import TorchModel, recipe_model
+from train.models.recipe import one_step
+from train.models.recipes import general, paper
+from train.models.torch_model import recipe_model
 
 
 def network(seed=0, hidden=(8, 8), activation="gelu"):
@@ -180,156 +179,35 @@ def test_weights_of_both_kinds_of_network_are_the_same():
     assert isinstance(model().network, BoundedNet)
 
 
-GROUPS = {
-    "edges": FEATURE_SETS["signed-18"].symmetries,
-    "unsigned edges": FEATURE_SETS["paper-5"].symmetries,
-    "vertices": RING_10.symmetries,
-}
-SIZES = {"edges": 8, "unsigned edges": 4, "vertices": 2}
+def test_the_mirror_exchanges_the_states_of_directed_edges_for_any_weights():
+    """Features of the mirrored edge have the other half of each state; answers change signs."""
+    group, network = DIRECTED_28.symmetries, random_network(3, 1.0, faces=True)
+    rows = torch.from_numpy(np.random.default_rng(0).standard_normal((50, 28)))
+    mirrored = rows[:, group.order[1]] * torch.from_numpy(group.signs[1])
+    state, twin = network.encoder(rows), network.encoder(mirrored)
+    half = state.shape[1] // 2
+    torch.testing.assert_close(twin, state.roll(half, 1), rtol=0, atol=1e-12)
+    signs = torch.tensor((*MIRRORED, 1.0), dtype=torch.float64)
+    answers = network.heads(state)
+    torch.testing.assert_close(network.heads(twin), answers * signs, rtol=0, atol=1e-12)
+    assert answers.abs().max() > 0.1
 
 
-def tied(name, copies=(4, 4), seed=0):
-    return TiedNet(GROUPS[name], copies, "silu", torch.Generator().manual_seed(seed))
-
-
-def trained(network, steps=5):
-    """After some steps on a task without any symmetry."""
-    optimiser = torch.optim.Adam(network.parameters(), lr=0.1)
-    width = network.linear_layers[0].in_features
-    generator = torch.Generator().manual_seed(1)
-    for _ in range(steps):
-        rows = torch.randn(64, width, generator=generator)
-        loss = (network(rows, 1.0) - rows[:, :3]).square().mean()
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-    return network
-
-
-@pytest.mark.parametrize("name", GROUPS)
-@pytest.mark.parametrize("copies", [(3,), (4, 4), (2, 3, 5)])
-def test_answers_turn_with_the_features_before_and_after_training(name, copies):
-    group = GROUPS[name]
-    rows = torch.from_numpy(np.random.default_rng(0).standard_normal((50, group.order.shape[1])))
-    for network in (tied(name, copies), trained(tied(name, copies))):
-        exact = copy.deepcopy(network).double()
-        z = exact.raw(rows)
-        assert z.abs().max() > 1e-2
-        for order, signs, local in zip(group.order, group.signs, group.local, strict=True):
-            turned = exact.raw(rows[:, order] * torch.from_numpy(signs))
-            torch.testing.assert_close(turned, z * torch.from_numpy(local), rtol=0, atol=1e-12)
-
-
-def test_a_dense_network_would_not():
-    group = GROUPS["edges"]
-    dense = tied("edges")
-    weights = [
-        (layer.weight.detach().clone(), layer.bias.detach()) for layer in dense.linear_layers
-    ]
-    weights[1][0][0, 0] += 0.1
-    rows = torch.randn(9, 18, generator=torch.Generator().manual_seed(0))
-
-    def raw(values):
-        for number, (weight, bias) in enumerate(weights):
-            values = values @ weight.T + bias
-            values = torch.nn.functional.gelu(values) if number < len(weights) - 1 else values
-        return values
-
-    g = 3
-    turned = raw(rows[:, group.order[g]] * torch.from_numpy(group.signs[g]).float())
-    assert (turned - raw(rows) * torch.from_numpy(group.local[g]).float()).abs().max() > 1e-4
-
-
-@pytest.mark.parametrize("name", GROUPS)
-def test_the_group_is_numbered_as_its_products_say(name):
-    group, size = GROUPS[name], SIZES[name]
-    assert len(group.order) == size
-    rows = np.random.default_rng(0).standard_normal(group.order.shape[1])
-
-    def act(g, values):
-        return group.signs[g] * values[group.order[g]]
-
-    for g in range(size):
-        for h in range(size):
-            np.testing.assert_array_equal(act(g, act(h, rows)), act(product(size)[g, h], rows))
-
-
-@pytest.mark.parametrize("name", GROUPS)
-def test_there_are_as_many_free_weights_as_the_group_leaves(name):
-    """A |G|th of the dense ones, layer by layer; the last bias is not divided."""
-    network, size = tied(name), SIZES[name]
-    dense = sum(layer.weight.numel() + layer.bias.numel() for layer in network.linear_layers)
+def test_only_what_the_mirror_leaves_is_free():
+    network = random_network(0)
     free = sum(parameter.numel() for parameter in network.parameters())
-    assert free == (dense - 3) // size + 3
+    dense = sum(
+        layer.weight.numel() + layer.bias.numel()
+        for layer in network.modules()
+        if isinstance(layer, torch.nn.Linear)
+    )
+    first, last = network.encoder[0], network.heads
+    # Of the first layer half the rows; of the heads half the columns, and the whole bias.
+    assert free == (dense - last.bias.numel()) // 2 + last.bias.numel()
+    assert first.parametrizations.weight.original.numel() == first.weight.numel() // 2
 
 
-def test_the_same_seed_gives_the_same_network_and_another_another():
-    first, same, other = tied("edges"), tied("edges"), tied("edges", seed=1)
-    for a, b in zip(first.parameters(), same.parameters(), strict=True):
-        assert torch.equal(a, b)
-    assert not torch.equal(first.linear_layers[0].weight, other.linear_layers[0].weight)
-
-
-def test_weights_survive_a_state_dictionary():
-    network, fresh = trained(tied("edges")), tied("edges", seed=7)
-    fresh.load_state_dict(network.state_dict())
-    rows = torch.randn(5, 18, generator=torch.Generator().manual_seed(0))
-    assert torch.equal(network(rows, 1.0), fresh(rows, 1.0))
-
-
-def test_a_mesh_mirrored_turned_over_and_renumbered_gives_the_same_surface():
-    """The whole rule, in double precision: what the group is for."""
-    edges, vertices = trained(tied("edges")).double(), trained(tied("vertices")).double()
-    scheme = pns(TorchModel("tied", DEFAULT_CARD, edges, vertices))
-    points, faces = bumpy_sphere(0, bump=0.1)
-    positions = refine(Mesh(points, faces), scheme, 1).mesh.vertices[: len(points)]
-    mirror = np.array([1.0, 1.0, -1.0])
-    mirrored = refine(Mesh(points * mirror, faces[:, ::-1]), scheme, 1).mesh.vertices[: len(points)]
-    np.testing.assert_allclose(mirrored * mirror, positions, rtol=0, atol=1e-12)
-    over = refine(Mesh(points, faces[:, ::-1]), scheme, 1).mesh.vertices[: len(points)]
-    np.testing.assert_allclose(over, positions, rtol=0, atol=1e-12)
-    rng = np.random.default_rng(0)
-    order = rng.permutation(len(points))
-    renumbered_faces = np.argsort(order)[rng.permutation(faces)]
-    again = refine(Mesh(points[order], renumbered_faces), scheme, 1)
-    assert again.ratio.max() > 0.01
-    np.testing.assert_allclose(again.mesh.vertices[: len(points)], positions[order], atol=1e-12)
-
-
-def test_gradients_reach_every_free_weight_through_the_operator_callable():
-    network = tied("edges")
-    rows = torch.randn(40, 18, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
-    unit_correction(network)(rows).square().sum().backward()
-    last_bias = network.linear_layers[-1].parametrizations.bias.original
-    for parameter in network.parameters():
-        assert (parameter.grad.abs().max() > 0) == (parameter is not last_bias)
-
-
-def test_a_scale_free_recipe_has_tied_networks_that_are_silent_before_training():
-    for network, features in (
-        (initial_network(general()), 18),
-        (initial_vertex_network(general()), 10),
-    ):
-        assert isinstance(network, TiedNet)
-        rows = torch.from_numpy(np.random.default_rng(0).normal(size=(7, features))).float()
-        assert not network(rows, 1.0).any()
-
-
-@pytest.mark.parametrize("hidden", [(50, 48), (4,), (0,)])
-def test_widths_that_symmetries_do_not_divide_are_refused(hidden):
-    """50 came out as 48, and the card said 50."""
-    with pytest.raises(ParameterError, match=r"hidden.*multiples of 8.*signed-18"):
-        initial_network(replace(general(), hidden=hidden))
-
-
-def test_only_a_scale_free_recipe_has_the_parts_of_one():
-    recipe = general()
-    assert scale_free_parts(recipe) == (recipe.scale_free, recipe.vertex)
-    with pytest.raises(ParameterError, match="scale-free"):
-        scale_free_parts(signed())
-
-
-def test_one_step_is_refused_where_a_recipe_trains_to_the_limit():
+def test_one_step_is_refused_where_a_recipe_trains_on_pairs():
     assert one_step(paper()).dataset == "ridge-training"
     with pytest.raises(ParameterError, match="one step"):
         one_step(general())

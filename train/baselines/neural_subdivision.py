@@ -6,17 +6,17 @@ vertices, V moves old vertices, E places new ones from the middle of their edge,
 over half-flaps. Other than in the source, lengths count in those of the half-edge, so that scale
 does not matter; I makes the features anew at each level; and vertices at a boundary stay.
 
-``python -m train.baselines.neural_subdivision`` trains the networks on the stream of the default
-model, by its loss, and writes them beside this file.
+``python -m train.baselines.neural_subdivision SHAPES PAIRS`` trains the networks on the pairs of
+the default model, by its loss, and writes them beside this file.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
+from sys import argv
 
+import numpy as np
 import safetensors.torch
-import scipy.sparse as sparse
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -24,12 +24,12 @@ from torch import Tensor, nn
 from pns_common.files import replace_file
 from train.baselines.placement import midpoints, placed_edges
 from train.connectivity import Connectivity, connect, next_corner
+from train.data.pair_store import make_pairs
 from train.fitting.determinism import deterministic
-from train.fitting.limit_batch import LimitBatch
-from train.fitting.limit_loss import LimitMeasures, limit_loss, measure
-from train.fitting.limit_trainer import LONGEST_GRADIENT, batches
+from train.fitting.pairs_trainer import PairPool, descend
+from train.fitting.training_pair import TrainingPair
 from train.models.networks import perceptron
-from train.models.recipe import Recipe, ToLimit
+from train.models.recipe import OnPairs, Recipe
 from train.reference import Step
 from train.refining import Method, loop_rule
 from train.tensors import dot, ratio, root, unit
@@ -39,8 +39,6 @@ WEIGHTS = Path(__file__).with_suffix(".safetensors")
 FEATURES, HIDDEN, COORDINATES = 32, (32, 32), 9
 # As in the source, the networks act at two levels.
 LEVELS = 2
-# Batches whose connectivity is kept; each comes back many times.
-KEPT = 128
 STEPS, LEARNING_RATE = 2000, 2e-3
 
 
@@ -117,37 +115,38 @@ def load_networks() -> HalfFlapNets:
 
 
 def fit_networks(
-    recipe: Recipe, plan: ToLimit, steps: int, on_step: Callable[[int, float], None]
+    recipe: Recipe, folders: tuple[Path, Path], on_step: Callable[[int, float], None]
 ) -> HalfFlapNets:
-    """Train on the meshes of a recipe's stream, by its loss, on the points after two levels."""
+    """Train on the pairs of a recipe, by its loss, on the points after two levels.
+
+    Args:
+        recipe: one that trains on pairs; its steps and learning rate are these networks'.
+        folders: of shapes and of pairs, as for ``train/run.py train``.
+        on_step: called after each step with the steps done and the loss.
+    """
+    plan, form = recipe.training, recipe.directed
+    assert isinstance(plan, OnPairs)
+    assert form is not None
+    files = make_pairs(*folders, plan.procedural, recipe.seed, 2, polygons=False)
+    kept: dict[TrainingPair, list[Connectivity]] = {}
+
+    def limit_of(pair: TrainingPair) -> Float[Tensor, "M 3"]:
+        if pair not in kept:
+            kept[pair] = _levels(pair)
+        points = torch.from_numpy(pair.mesh.vertices.copy())
+        for mesh in kept[pair]:
+            points = torch.cat(networks.placed(points, mesh))
+        return points
+
     with deterministic():
         networks = HalfFlapNets(torch.Generator().manual_seed(recipe.seed))
-        optimiser = torch.optim.Adam(networks.parameters(), lr=LEARNING_RATE)
-        schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=steps)
-        for done, (batch, reference) in enumerate(batches(replace(recipe, steps=steps), plan), 1):
-            loss = limit_loss(plan.weights, _measured(batch, networks), reference)
-            optimiser.zero_grad()
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(networks.parameters(), LONGEST_GRADIENT)
-            optimiser.step()
-            schedule.step()
-            on_step(done, loss.item())
+        descend(recipe, plan, PairPool(files, form, plan), networks, limit_of, on_step)
     return networks
 
 
-def _measured(batch: LimitBatch, networks: HalfFlapNets) -> LimitMeasures:
-    points = batch.level.points
-    for mesh in _levels(batch):
-        points = torch.cat(networks.placed(points, mesh))
-    as_they_are = sparse.csr_array(sparse.eye_array(len(points)))
-    return measure(replace(batch, limit=as_they_are), points)
-
-
-@lru_cache(KEPT)
-def _levels(batch: LimitBatch) -> list[Connectivity]:
+def _levels(pair: TrainingPair) -> list[Connectivity]:
     """Return the meshes at which the networks act."""
-    topology = batch.level.level.topology
-    levels = [connect(topology.corners.reshape(-1, 3), topology.vertex_count)]
+    levels = [connect(np.array(pair.mesh.faces), len(pair.mesh.vertices))]
     for _ in range(LEVELS - 1):
         last = levels[-1]
         levels.append(connect(last.split().numpy(), last.vertex_count + len(last.edges)))
@@ -158,14 +157,12 @@ def main() -> None:
     """Train the networks and write them."""
     from train.models.recipes import general
 
-    recipe = general()
-    assert isinstance(recipe.training, ToLimit)
-
     def told(done: int, loss: float) -> None:
         if done % 100 == 0:
             print(f"{done} of {STEPS}: {loss:.3f}", flush=True)
 
-    networks = fit_networks(recipe, recipe.training, STEPS, told)
+    recipe = replace(general(), steps=STEPS, learning_rate=LEARNING_RATE)
+    networks = fit_networks(recipe, (Path(argv[1]), Path(argv[2])), told)
     replace_file(WEIGHTS, safetensors.torch.save(networks.state_dict()))
 
 

@@ -1,7 +1,7 @@
-"""Gradient ascent over weights and mesh at once, against what the scale-free rule promises.
+"""Gradient ascent over weights and mesh at once, against what the rule of directed edges promises.
 
 Each search climbs a smooth stand-in of a promise that any weights must keep; the promise itself is
-measured at every step, from positions. Networks are tied ones, in double precision.
+measured at every step, from positions. Networks are in double precision.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,17 +14,15 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common import Mesh
-from pns_common.model.features import FEATURE_SETS, RING_10
 from train.certificates.learned_once import largest_turn
 from train.connectivity import Connectivity, connect
+from train.directed_rule import DirectedRule
 from train.loop_masks import limit_mask
-from train.models.networks import unit_correction
-from train.models.recipe import ScaleFree
-from train.models.tied import TiedNet
-from train.reference import EDGE_FEATURES, GeneralRule, Step, Surroundings
+from train.models.directed import DirectedNet
+from train.models.recipe import DirectedForm
+from train.reference import Step, Surroundings
 
 RATE = 0.03
-GATE_SHARPNESS, VERTEX_GATE_SHARPNESS = 1e6, 1e3
 PEAK = 8
 
 # A step, and the connectivity of the mesh that it made.
@@ -53,36 +51,30 @@ class Worst:
 def ascend(
     goal: Goal,
     mesh: Mesh,
-    form: ScaleFree,
-    budget: float,
+    form: DirectedForm,
     seed: int,
     steps: int,
     loudness: float = 1.0,
-    features: str = "signed-18",
 ) -> Worst:
     """Climb a goal from random weights, `loudness` times their usual size, and from a mesh."""
     generator = torch.Generator().manual_seed(seed)
-    edges = TiedNet(FEATURE_SETS[features].symmetries, (2, 2), "gelu", generator).double()
-    vertices = TiedNet(RING_10.symmetries, (4,), "gelu", generator).double()
+    network = DirectedNet(generator, form.width, form.hidden, form.rounds).double()
     with torch.no_grad():
-        for weight in (*edges.parameters(), *vertices.parameters()):
+        for weight in network.parameters():
             weight *= loudness
-    rule = GeneralRule(
-        unit_correction(edges),
-        unit_correction(vertices),
-        budget,
-        GATE_SHARPNESS,
-        VERTEX_GATE_SHARPNESS,
-        form.prior_strength,
-        form.boundary_strength,
+    rule = DirectedRule(
+        network,
+        form.budget,
+        form.gate_sharpness,
+        form.vertex_gate_sharpness,
+        form.curve_strength,
         form.network_scale,
         form.fold_angle,
-        EDGE_FEATURES[features],
     )
     level = connect(np.array(mesh.faces), len(mesh.vertices))
     after = connect(level.split().numpy(), level.vertex_count + len(level.edges))
     points = torch.tensor(mesh.vertices, requires_grad=True)
-    optimiser = torch.optim.Adam([points, *edges.parameters(), *vertices.parameters()], lr=RATE)
+    optimiser = torch.optim.Adam([points, *network.parameters()], lr=RATE)
     seen: list[tuple[float, ...]] = []
     for _ in range(steps):
         step = rule(points, level)

@@ -49,39 +49,18 @@ class DoubleModel:
     hash: str
     _evaluator: Any = field(repr=False)
 
-    def __call__(
-        self, features: Float[np.ndarray, "E K"], budget: float
-    ) -> Float[np.ndarray, "E 3"]:
-        """Return the corrections, float64."""
-        return self._answer("correction", "features", features, budget)
-
-    def vertex_correction(
-        self, features: Float[np.ndarray, "N L"], budget: float
-    ) -> Float[np.ndarray, "N 3"]:
-        """Return the weights for the rings of old vertices, float64."""
-        return self._answer("vertex_correction", "vertex_features", features, budget)
-
-    def face_correction(
-        self, features: Float[np.ndarray, "N M"], budget: float
-    ) -> Float[np.ndarray, "N 1"]:
-        """Return the lengths along the normals of faces, float64."""
-        return self._answer("face_correction", "face_features", features, budget)
-
-    def sharpness(self, features: Float[np.ndarray, "N P"]) -> Float[np.ndarray, "N 1"]:
-        """Return the sharpness of edges, float64."""
-        return self._answer("sharpness", "sharpness_features", features, 1.0)
-
-    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> Float[np.ndarray, "N A"]:
-        """Return the answers of the network that reads the input ``given``, float64."""
-        (output,) = (each.answer for each in networks(self.card) if each.given == given)
-        return self._answer(output, given, rows, 1.0)
-
-    def _answer(
-        self, output: str, given: str, features: Float[np.ndarray, "N K"], budget: float
+    def run(
+        self, given: str, rows: Float[np.ndarray, "N K"], budget: float = 1.0
     ) -> Float[np.ndarray, "N A"]:
+        """Return the answers of the network that reads the input ``given``, float64.
+
+        Raises:
+            ModelError: the graph does not run in double precision.
+        """
+        (output,) = (each.answer for each in networks(self.card) if each.given == given)
         # The evaluator wants every input, also those that this output does not need.
         inputs = {each.given: np.zeros((1, each.columns)) for each in networks(self.card)}
-        inputs[given] = np.asarray(features, dtype=np.float64)
+        inputs[given] = np.asarray(rows, dtype=np.float64)
         inputs["budget"] = np.asarray(budget, dtype=np.float64)
         # A hostile file may overflow or make a NaN; the operator looks at what comes out.
         with np.errstate(all="ignore"):

@@ -1,7 +1,7 @@
 """Certificates of schemes that correct at the control mesh and are the base scheme afterwards.
 
 Fold-free, limit distance, smoothness class, resolution independence, numbering and locality, of the
-scale-free rule and any weights: docs/explanation/guarantees.md proves them.
+rule of directed edges and any weights: docs/explanation/guarantees.md proves them.
 """
 
 import math
@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common import Creases, Mesh, Scheme
 from pns_common import refine as refine_by_library
+from pns_common.operator.formula import DirectedRule
 from train.certificates.bodies import Body
 from train.certificates.plain import PlainStep
 from train.certificates.scaling import SAME_AS_BASE
@@ -271,7 +272,7 @@ def _without_guard(subject: Subject) -> Scheme:
     """Return the scheme as it runs, with a budget too small to turn a face by its fold angle."""
     scheme = subject.scheme
     assert isinstance(scheme, Scheme)
-    assert scheme.rule is not None
+    assert isinstance(scheme.rule, DirectedRule)
     return replace(scheme, rule=replace(scheme.rule, budget=TOO_LITTLE))
 
 

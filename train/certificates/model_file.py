@@ -5,15 +5,15 @@ that breaks its contract, or claims what it does not reach, is not to be trusted
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, cast
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common import pns
-from pns_common.model.card import DIRECTED_FORMAT, EDGE_FEATURES, FACE_FEATURES, VERTEX_FEATURES
-from pns_common.model.session import DirectedModel, Model, Network, PolygonModel, networks
+from pns_common.model.card import DIRECTED_FORMAT
+from pns_common.model.session import Model, Network, networks
 from train.certificates.subject import Certificate
 from train.metrics.card import MEASURES
 
@@ -30,16 +30,10 @@ POINTS = 0.05
 
 def keeps_its_word(model: Model) -> list[Certificate]:
     """Certify a model's answers at sample features and its card's metrics."""
+    held = networks(model.card)
     if model.card.format == DIRECTED_FORMAT:
-        return [*(_finite(model, network) for network in networks(model.card)), _metrics(model)]
-    rows = _answers(model, EDGE_FEATURES[model.card.features], "corrections")
-    if model.card.vertex_features is not None:
-        count = VERTEX_FEATURES[model.card.vertex_features]
-        rows += _answers(model.vertex_correction, count, "vertex corrections")
-    if model.card.face_features is not None:
-        count = FACE_FEATURES[model.card.face_features]
-        rows += _answers(cast(PolygonModel, model).face_correction, count, "face corrections")
-    return [*rows, _metrics(model)]
+        return [*(_finite(model, network) for network in held), _metrics(model)]
+    return [*_bounded(model, held[0]), _metrics(model)]
 
 
 def sample_features(count: int) -> Float[np.ndarray, "N K"]:
@@ -56,18 +50,17 @@ def sample_features(count: int) -> Float[np.ndarray, "N K"]:
 def _finite(model: Model, network: Network) -> Certificate:
     """Certify one network of directed edges: its rows are bounded, and so is no answer's length."""
     rows = np.random.default_rng(0).uniform(-WIDEST, WIDEST, (SAMPLES, network.columns))
-    answers = cast(DirectedModel, model).run(network.given, rows)
+    answers = model.run(network.given, rows)
     wrong = int((~np.isfinite(answers).all(axis=1)).sum())
     return Certificate("file", f"finite {network.answer}", wrong, 0, 0, f"of {SAMPLES} rows")
 
 
-def _answers(
-    model: Callable[[np.ndarray, float], np.ndarray], count: int, what: str
-) -> list[Certificate]:
-    features = sample_features(count)
+def _bounded(model: Model, network: Network) -> list[Certificate]:
+    """Certify the network of the paper's rule: finite corrections, within the budget."""
+    features = sample_features(network.columns)
     not_finite, longest, budget_of_longest = 0, 0.0, BUDGETS[0]
     for budget in BUDGETS:
-        answers = np.asarray(model(features, budget), dtype=np.float64)
+        answers = np.asarray(model.run(network.given, features, budget), dtype=np.float64)
         finite = np.isfinite(answers).all(axis=1)
         not_finite += int((~finite).sum())
         share = np.linalg.norm(answers[finite], axis=1).max(initial=0) / budget
@@ -75,7 +68,7 @@ def _answers(
     return [
         Certificate(
             "file",
-            f"finite {what}",
+            "finite corrections",
             not_finite,
             0,
             0,
@@ -83,7 +76,7 @@ def _answers(
         ),
         Certificate(
             "file",
-            f"{what} within the budget given",
+            "corrections within the budget given",
             longest,
             high=SINGLE_PRECISION,
             where=f"budget {budget_of_longest:g}",

@@ -4,14 +4,18 @@ import copy
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeVar
+
+from torch import nn
 
 from pns_common import pns
 from pns_common.model.card import PAPER_FORMAT, ModelCard
 from pns_common.model.session import Model
 from train.certificates.bases import CATMULL_CLARK, LOOP, Base
-from train.models.networks import BoundedNet
 from train.models.torch_model import TorchModel
 from train.refining import AnyScheme
+
+Trained = TypeVar("Trained", bound=nn.Module)
 
 # A budget that no correction reaches.
 UNBOUNDED = 1e15
@@ -81,12 +85,11 @@ def subject_of_model(model: Model, exact: Model, budget: float | None = None) ->
 
 def subject_of_network(model: TorchModel, budget: float | None = None) -> Subject:
     """Return the learned operator with a torch network."""
-    vertices = None if model.vertex_network is None else in_double(model.vertex_network)
-    exact = TorchModel(model.name, model.card, in_double(model.network), vertices)
+    exact = TorchModel(model.name, model.card, in_double(model.network))
     return subject_of_model(model, exact, budget)
 
 
-def in_double(network: BoundedNet) -> BoundedNet:
+def in_double(network: Trained) -> Trained:
     """Return a copy of a network in double precision."""
     return copy.deepcopy(network).double()
 

@@ -3,7 +3,7 @@
 import multiprocessing
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count as count_from_0
 from itertools import islice
 from pathlib import Path
@@ -15,7 +15,7 @@ from pns_common import Mesh
 from pns_common.files import replace_file
 from train.data.pairs.drawn import drawn_pair
 from train.data.pairs.pair_stream import pair_stream
-from train.data.pairs.polygons import polygon_stream
+from train.data.pairs.polygons import in_polygons, polygon_stream
 from train.data.pairs.references import Pair
 from train.data.shape_library import TRAINING, ListedShape, listed_shapes
 from train.data.shape_pairs import shape_pairs
@@ -62,8 +62,9 @@ def make_pairs(
     folder.mkdir(parents=True, exist_ok=True)
     listed = [(number, shape) for number, shape in enumerate(listed_shapes(TRAINING))]
     # A process for each shape: what MeshLab collapses depends on what it collapsed before.
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, spawn, max_tasks_per_child=1) as pool:
+    fresh = multiprocessing.get_context("forkserver")
+    fresh.set_forkserver_preload([__name__])
+    with ProcessPoolExecutor(processes, fresh, max_tasks_per_child=1) as pool:
         real = [
             pool.submit(_keep_real, shapes, folder, number, shape, seed, polygons)
             for number, shape in listed
@@ -106,17 +107,22 @@ def _keep_procedural(folder: Path, count: int, seed: int, polygons: bool) -> lis
     ending = "quads" if polygons else "stream"
     paths = [folder / f"{seed}-{ending}-{number:05d}.npz" for number in range(count)]
     if not all(path.exists() for path in paths):
-        stream: Iterator[Pair] = (polygon_stream if polygons else _with_drawn)(seed)
-        for path, pair in zip(paths, islice(stream, count), strict=True):
+        stream = islice(_with_drawn(seed, polygons), count)
+        for path, pair in zip(paths, stream, strict=True):
             _keep(path, [pair])
     return paths
 
 
-def _with_drawn(seed: int) -> Iterator[Pair]:
+def _with_drawn(seed: int, polygons: bool) -> Iterator[Pair]:
     """Yield the stream's pairs, and a body of revolution in place of every fifth."""
-    rng, stream = np.random.default_rng(seed), pair_stream(seed)
+    rng = np.random.default_rng(seed)
+    stream = polygon_stream(seed) if polygons else pair_stream(seed)
     for number in count_from_0():
-        yield drawn_pair(rng) if number % DRAWN == 0 else next(stream)
+        if number % DRAWN:
+            yield next(stream)
+            continue
+        pair = drawn_pair(rng)
+        yield replace(pair, coarse=in_polygons(pair.coarse, rng)) if polygons else pair
 
 
 def _keep(path: Path, pairs: Iterable[Pair]) -> None:

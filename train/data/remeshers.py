@@ -1,65 +1,42 @@
-"""Remeshers of dense shapes in quads, whose vertices are laid onto the shape."""
+"""Remeshing of dense shapes in quads, whose vertices are laid onto the shape."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from types import MappingProxyType
 from typing import Any
 
 import igl
 import numpy as np
-import pymeshlab
 import pynanoinstantmeshes
 from jaxtyping import Float
 
 from pns_common import Mesh, MeshError
-from train.data.simplifiers import isotropic
 
-# Libraries without types.
-meshlab: Any = pymeshlab
+# A library without types.
 instant_meshes: Any = pynanoinstantmeshes
 
 # Its last step splits each face in four.
 SPLIT, FEWEST = 4, 6
-
-# Triangles that give a face of the joined mesh, about.
-JOINED = 1.9
 
 
 def instant(mesh: Mesh, faces: int, smoothed: int = 2) -> Mesh:
     """Remesh in quads along the shape's curvature, smoothed so often (Jakob et al. 2015).
 
     Raises:
-        MeshError: no face is left.
+        MeshError: no face is left, or it gives up.
     """
-    with _silence():
-        points, quads = instant_meshes.remesh(
-            mesh.vertices.astype(np.float32),
-            mesh.faces.astype(np.uint32),
-            max(faces // SPLIT, FEWEST),
-            smooth_iter=smoothed,
-            deterministic=True,
-        )
+    try:
+        with _silence():
+            points, quads = instant_meshes.remesh(
+                mesh.vertices.astype(np.float32),
+                mesh.faces.astype(np.uint32),
+                max(faces // SPLIT, FEWEST),
+                smooth_iter=smoothed,
+                deterministic=True,
+            )
+    except RuntimeError as error:
+        raise MeshError(f"Instant Meshes gives up: {error}", element="faces") from error
     return laid_onto(mesh, _tidied(points.astype(np.float64), quads.tolist()))
-
-
-def joined(mesh: Mesh, faces: int) -> Mesh:
-    """Remesh to one edge length, and join triangles to quads where they fit (MeshLab).
-
-    Raises:
-        MeshError: no face is left.
-    """
-    triangles, meshes = isotropic(mesh, int(JOINED * faces)), meshlab.MeshSet(verbose=False)
-    meshes.add_mesh(meshlab.Mesh(triangles.vertices, triangles.faces.astype(np.int32)))
-    meshes.meshing_tri_to_quad_dominant(level="Fewest triangles")
-    made = meshes.current_mesh()
-    polygons = [face.tolist() for face in made.polygonal_face_list()]
-    return laid_onto(mesh, _tidied(made.vertex_matrix(), polygons))
-
-
-REMESHERS: Mapping[str, Callable[[Mesh, int], Mesh]] = MappingProxyType(
-    {"instant": instant, "joined": joined}
-)
 
 
 def with_points(mesh: Mesh, points: Float[np.ndarray, "V 3"]) -> Mesh:

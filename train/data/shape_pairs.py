@@ -10,8 +10,9 @@ from jaxtyping import Float
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import read_mesh, welded
 from train.data.pairs.faceted import sampled
+from train.data.pairs.polygons import REMESHERS
 from train.data.pairs.references import Pair
-from train.data.remeshers import REMESHERS, with_points
+from train.data.remeshers import with_points
 from train.data.simplifiers import SIMPLIFIERS, Simplifier
 from train.surfaces.solids import random_rotation
 

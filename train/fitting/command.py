@@ -1,7 +1,7 @@
 """`python train/run.py train`: a checkpoint, and the held-out table."""
 
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -16,9 +16,8 @@ from pns_common import PnsError, pns
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import Fit, fit
 from train.metrics.card import card_metrics
-from train.metrics.one_step import Improvement, improvement_table, improvements_as_data
+from train.metrics.one_step import improvement_table, improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.networks import BoundedNet
 from train.models.recipe import Recipe, of_length
 from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
@@ -85,14 +84,11 @@ def _errors_told(console: Console) -> Generator[None, None, None]:
 
 def _measure_and_save(path: Path, recipe: Recipe, trained: Fit, console: Console) -> None:
     network = trained.network
-    others = trained.vertex_network, trained.sharpness_network, trained.face_network
-    improvements: Mapping[str, Mapping[str, Improvement]] = {}
-    if isinstance(network, BoundedNet):
-        scheme = pns(recipe_model(recipe, network, *others), recipe.budget)
-        improvements = card_metrics(recipe, scheme)
+    scheme = pns(recipe_model(recipe, network), recipe.budget)
+    improvements = card_metrics(recipe, scheme)
     metrics = {name: improvements_as_data(rows) for name, rows in improvements.items()}
     machine = machine_fingerprint()
-    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine, *others))
+    save_checkpoint(path, Checkpoint(recipe, network, metrics, machine))
     for name, rows in improvements.items():
         console.print(improvement_table(f"{name}, recipe {recipe.name}", rows))
 

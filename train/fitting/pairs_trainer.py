@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Float
-from torch import Tensor
+from torch import Tensor, nn
 
 from train.data.pair_store import make_pairs, read_pairs
 from train.fitting.determinism import deterministic
@@ -79,26 +79,46 @@ def fit_to_pairs(
     files = make_pairs(*folders, count, recipe.seed, processes, polygons=polygons)
     with deterministic():
         network, pool = initial_directed(recipe), PairPool(files, form, plan)
-        rng = np.random.default_rng(recipe.seed)
-        optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
-        losses: list[float] = []
-        for step in range(recipe.steps):
-            rate = min(1, (step + 1) / WARM_UP) * (1 - step / recipe.steps) ** FALL + LAST
-            for group in optimiser.param_groups:
-                group["lr"] = recipe.learning_rate * rate
-            optimiser.zero_grad()
-            total = 0.0
-            for _ in range(plan.meshes):
-                pair = pool.draw(rng)
-                ratios = pair.ratios(pair.control.limit(network).points, rng)
-                loss = pair_loss(plan.weights, ratios) / plan.meshes
-                loss.backward()
-                total += loss.item()
-            torch.nn.utils.clip_grad_norm_(network.parameters(), LONGEST_GRADIENT)
-            optimiser.step()
-            losses.append(total)
-            on_step(step + 1, total)
-    return network, tuple(losses)
+
+        def limit_of(pair: TrainingPair) -> Tensor:
+            return pair.control.limit(network).points
+
+        losses = descend(recipe, plan, pool, network, limit_of, on_step)
+    return network, losses
+
+
+def descend(
+    recipe: Recipe,
+    plan: OnPairs,
+    pool: PairPool,
+    network: nn.Module,
+    limit_of: Callable[[TrainingPair], Tensor],
+    on_step: Callable[[int, float], None],
+) -> tuple[float, ...]:
+    """Train any network on drawn pairs with Adam; return the loss before each step.
+
+    ``limit_of`` returns the points of a pair's control mesh after two levels, (M, 3).
+    """
+    rng = np.random.default_rng(recipe.seed)
+    optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
+    losses: list[float] = []
+    for step in range(recipe.steps):
+        rate = min(1, (step + 1) / WARM_UP) * (1 - step / recipe.steps) ** FALL + LAST
+        for group in optimiser.param_groups:
+            group["lr"] = recipe.learning_rate * rate
+        optimiser.zero_grad()
+        total = 0.0
+        for _ in range(plan.meshes):
+            pair = pool.draw(rng)
+            ratios = pair.ratios(limit_of(pair), rng)
+            loss = pair_loss(plan.weights, ratios) / plan.meshes
+            loss.backward()
+            total += loss.item()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), LONGEST_GRADIENT)
+        optimiser.step()
+        losses.append(total)
+        on_step(step + 1, total)
+    return tuple(losses)
 
 
 def pair_loss(weights: PairWeights, ratios: Sequence[Float[Tensor, ""]]) -> Float[Tensor, ""]:

@@ -13,13 +13,12 @@ from pns_common import ParameterError
 from train.data.batch import Batch, disjoint_union
 from train.data.datasets import DATASETS, Instance
 from train.fitting.determinism import deterministic
-from train.fitting.limit_trainer import fit_to_limit
 from train.fitting.pairs_trainer import fit_to_pairs
 from train.fitting.quiet import quiet_term
 from train.models.directed import DirectedNet
 from train.models.from_recipe import initial_network, paper_rule
-from train.models.networks import BoundedNet, SharpNet
-from train.models.recipe import LossWeights, OneStep, OnPairs, Recipe, ToLimit, one_step
+from train.models.networks import BoundedNet
+from train.models.recipe import LossWeights, OneStep, OnPairs, Recipe, one_step
 from train.reference import Step
 from train.surfaces.implicit import signed_distance, unit_normal
 from train.tensors import dot, unit
@@ -32,16 +31,10 @@ Loss = Callable[[BoundedNet, Batch], Float[Tensor, ""]]
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Trained float32 networks and the loss before each step.
-
-    The others than `network` are None where the recipe has none.
-    """
+    """A trained float32 network and the loss before each step."""
 
     network: BoundedNet | DirectedNet
     losses: tuple[float, ...]
-    vertex_network: BoundedNet | None = None
-    sharpness_network: SharpNet | None = None
-    face_network: BoundedNet | None = None
 
 
 def fit(recipe: Recipe, on_step: OnStep, folders: tuple[Path, Path] | None = None) -> Fit:
@@ -60,9 +53,6 @@ def fit(recipe: Recipe, on_step: OnStep, folders: tuple[Path, Path] | None = Non
             if folders is None or recipe.directed is None:
                 raise ParameterError("folders", folders, expected="folders of shapes and pairs")
             return Fit(*fit_to_pairs(recipe, recipe.directed, plan, folders, on_step))
-        case ToLimit() as plan:
-            made, losses = fit_to_limit(recipe, plan, on_step)
-            return Fit(made.edge, losses, made.vertex, made.sharp, made.face)
         case OneStep():
             quiet = with_quiet(recipe, lambda network, batch: batch_loss(recipe, network, batch))
             return optimise(recipe, quiet, on_step)

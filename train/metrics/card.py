@@ -63,7 +63,7 @@ TO_LIMIT = tuple(name for name in MEASURES if name.endswith("levels"))
 
 def card_metrics(recipe: Recipe, scheme: AnyScheme) -> dict[str, Mapping[str, Improvement]]:
     """Measure a trained scheme for its card; nothing over Catmull–Clark: all sets are triangles."""
-    if recipe.face is not None:
+    if recipe.directed is not None and recipe.directed.base != "loop":
         return {}
     names = ONE_STEP if isinstance(recipe.training, OneStep) else TO_LIMIT
     return {name: MEASURES[name](scheme) for name in names}

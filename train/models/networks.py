@@ -10,26 +10,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pns_common.model.card import (
-    EDGE_FEATURES,
-    FACE_FEATURES,
-    SHARPNESS_FEATURES,
-    VERTEX_FEATURES,
-)
+from pns_common.model.card import EDGE_FEATURES
 from pns_common.model.features import Symmetries
 
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
 
-INPUT_COUNT: Mapping[str, int] = MappingProxyType(
-    {
-        **EDGE_FEATURES,
-        **VERTEX_FEATURES,
-        **FACE_FEATURES,
-        **SHARPNESS_FEATURES,
-        RAW_COORDINATES: 12,
-    }
-)
+INPUT_COUNT: Mapping[str, int] = MappingProxyType({**EDGE_FEATURES, RAW_COORDINATES: 12})
 
 
 ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
@@ -41,9 +28,8 @@ ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
 class BoundedNet(nn.Module):
     """A small perceptron whose output never leaves the ball: η = C z / max(1, ‖z‖).
 
-    Answers are vectors, or with `outputs` 1 lengths. The bound holds for any weights. Its layers
-    are `net.0`, `net.2`, …, as in the published state dictionaries. Source: paper, PNS operator and
-    algorithm.
+    The bound holds for any weights. Its layers are `net.0`, `net.2`, …, as in the published state
+    dictionaries. Source: paper, PNS operator and algorithm.
     """
 
     def __init__(
@@ -52,20 +38,19 @@ class BoundedNet(nn.Module):
         hidden: tuple[int, ...],
         activation: str,
         generator: torch.Generator,
-        outputs: int = 3,
     ):
         super().__init__()
         self.activation = activation
-        self.net = perceptron((feature_count, *hidden, outputs), activation, generator)
+        self.net = perceptron((feature_count, *hidden, 3), activation, generator)
 
     def forward(
         self, features: Float[Tensor, "E K"], budget: float | Float[Tensor, ""]
-    ) -> Float[Tensor, "E A"]:
+    ) -> Float[Tensor, "E 3"]:
         """Return η with ‖η‖ ≤ budget."""
         z = self.raw(features)
         return budget * z / torch.linalg.vector_norm(z, dim=-1, keepdim=True).clamp(min=1)
 
-    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E A"]:
+    def raw(self, features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
         """Return z, of any length."""
         return self.net(features)
 
@@ -73,40 +58,6 @@ class BoundedNet(nn.Module):
     def linear_layers(self) -> list[nn.Linear]:
         """The layers that hold weights, from features to z."""
         return [layer for layer in self.net if isinstance(layer, nn.Linear)]
-
-
-class SharpNet(nn.Module):
-    """A small perceptron of one answer; its sigmoid is the sharpness of an edge."""
-
-    def __init__(
-        self,
-        feature_count: int,
-        hidden: tuple[int, ...],
-        activation: str,
-        generator: torch.Generator,
-    ):
-        super().__init__()
-        self.activation = activation
-        self.net = perceptron((feature_count, *hidden, 1), activation, generator)
-
-    def forward(self, features: Float[Tensor, "N K"]) -> Float[Tensor, "N 1"]:
-        """Return the answer before the sigmoid."""
-        return self.net(features)
-
-    @property
-    def linear_layers(self) -> list[nn.Linear]:
-        """The layers that hold weights."""
-        return [layer for layer in self.net if isinstance(layer, nn.Linear)]
-
-
-class Networks(nn.Module):
-    """The networks of a scale-free rule; `face` where its base scheme is Catmull–Clark's."""
-
-    def __init__(
-        self, edge: BoundedNet, vertex: BoundedNet, sharp: SharpNet, face: BoundedNet | None = None
-    ):
-        super().__init__()
-        self.edge, self.vertex, self.sharp, self.face = edge, vertex, sharp, face
 
 
 class SymmetricNet(BoundedNet):
@@ -144,7 +95,7 @@ def unit_correction(network: BoundedNet) -> Callable[[Tensor], Tensor]:
     The geometry is float64, the network keeps its own precision, as in the product.
     """
 
-    def correction(features: Float[Tensor, "E K"]) -> Float[Tensor, "E A"]:
+    def correction(features: Float[Tensor, "E K"]) -> Float[Tensor, "E 3"]:
         own = network.linear_layers[0].weight.dtype
         return network(features.to(own), 1.0).to(features.dtype)
 

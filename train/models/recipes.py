@@ -8,16 +8,11 @@ import msgspec
 
 from train.models.recipe import (
     DirectedForm,
-    LimitWeights,
     LossWeights,
-    NetworkShape,
     OneStep,
     OnPairs,
     PairWeights,
     Recipe,
-    ScaleFree,
-    ToLimit,
-    VertexRule,
     one_step,
 )
 
@@ -90,77 +85,13 @@ def signed(seed: int = 0) -> Recipe:
 def general(seed: int = 0) -> Recipe:
     """Return the default model's recipe: any mesh, at any scale, corrected once.
 
-    It starts from quasi-interpolation along the normal, which networks of zeros leave as it is;
-    s is 0.85, since vertices of simplified meshes lie outside a little already.
-    C = 10 leaves room for all that is right on meshes as coarse as a cube; what must not happen
-    there, the fold guard prevents. The gates open where faces are bent by two hundredths of a
-    radian, so that fine meshes gain as well.
+    It learns from real and procedural shapes, simplified and refined back. C = 10 leaves room for
+    all that is right on meshes as coarse as a cube; what must not happen there, the fold guard
+    prevents. The gates open where faces are bent by two hundredths of a radian, so that fine
+    meshes gain as well.
     """
     return Recipe(
         name="general",
-        features="signed-18",
-        hidden=(32, 32),
-        activation="silu",
-        budget=10.0,
-        gate_sharpness=1e7,
-        training=ToLimit(
-            weights=LimitWeights(
-                mean=1.0, spread=0.5, peak=0.7, normal=4.0, worse=1.5, worse_from=0.95, sharp=1.0
-            ),
-            faces=600,
-            pool=80,
-            reuse=30,
-            start=800,
-        ),
-        steps=6000,
-        learning_rate=2.5e-3,
-        seed=seed,
-        orientation="symmetric",
-        vertex=VertexRule("ring-10", hidden=(32, 32), gate_sharpness=1e4),
-        scale_free=ScaleFree(
-            base="loop",
-            prior_strength=0.85,
-            boundary_strength=1.0,
-            network_scale=0.4,
-            fold_angle=40.0,
-            sharpness_levels=6,
-        ),
-        sharpness=NetworkShape("crease-53", hidden=(32, 32)),
-    )
-
-
-def general_quad(seed: int = 0) -> Recipe:
-    """Return the recipe for meshes of polygons: `general` over Catmull–Clark, with its sharpness.
-
-    Sharpness trained on quads alone found fewer sharp edges of parts than that of triangles does.
-    """
-    base = general(seed)
-    assert base.scale_free is not None
-    assert base.sharpness is not None
-    assert isinstance(base.training, ToLimit)
-    plan = base.training
-    return replace(
-        base,
-        name="general-quad",
-        scale_free=replace(base.scale_free, base="catmull-clark", prior_strength=1.0),
-        training=msgspec.structs.replace(
-            plan,
-            weights=replace(plan.weights, sharp=0.0),
-            faces=400,
-            pool=80,
-            reuse=16,
-            start=0,
-        ),
-        steps=1500,
-        sharpness=replace(base.sharpness, of_model="general"),
-        face=NetworkShape("face-8", hidden=(32, 32)),
-    )
-
-
-def directed(seed: int = 0) -> Recipe:
-    """Return the recipe of directed edges: real and procedural shapes, refined back."""
-    return Recipe(
-        name="directed",
         features="directed-28",
         hidden=(),
         activation="silu",
@@ -204,6 +135,14 @@ def directed(seed: int = 0) -> Recipe:
     )
 
 
+def general_quad(seed: int = 0) -> Recipe:
+    """Return the recipe for meshes of polygons: `general` over Catmull–Clark."""
+    base = general(seed)
+    assert base.directed is not None
+    over = replace(base.directed, base="catmull-clark")
+    return replace(base, name="general-quad", directed=over)
+
+
 RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
     {
         "paper": paper,
@@ -211,6 +150,5 @@ RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
         "signed": signed,
         "general": general,
         "general-quad": general_quad,
-        "directed": directed,
     }
 )

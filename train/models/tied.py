@@ -20,42 +20,6 @@ from torch import Tensor, nn
 from torch.nn.utils import parametrize
 
 from pns_common.model.features import Symmetries
-from train.models.networks import BoundedNet
-
-
-class TiedNet(BoundedNet):
-    """A bounded perceptron with η(g φ) = D_g η(φ) for any values of its parameters.
-
-    `copies` are the m of its hidden layers: they are |G| m wide. The free parameters are a |G|th
-    of a dense network's but for the first layer's, which are too.
-    """
-
-    def __init__(
-        self,
-        group: Symmetries,
-        copies: tuple[int, ...],
-        activation: str,
-        generator: torch.Generator,
-        sizes: Float[np.ndarray, " K"] | None = None,
-    ):
-        size = len(group.order)
-        super().__init__(
-            group.order.shape[1],
-            tuple(size * m for m in copies),
-            activation,
-            generator,
-            outputs=group.local.shape[1],
-        )
-        first, *hidden, last = self.linear_layers
-        _tie(first, _TiedFirst(group), _Repeated(size))
-        for layer in hidden:
-            _tie(layer, _TiedHidden(size), _Repeated(size))
-        _tie(last, _TiedLast(group), _Invariant(group))
-        if sizes is not None:
-            parametrize.register_parametrization(first, "weight", _InUnits(sizes))
-            with torch.no_grad():
-                for name in ("weight", "bias"):
-                    setattr(last, name, torch.zeros_like(getattr(last, name)))
 
 
 def _tie(layer: nn.Linear, weight: nn.Module, bias: nn.Module) -> None:
@@ -83,23 +47,6 @@ class _TiedFirst(nn.Module):
 
     def right_inverse(self, dense: Float[Tensor, "Gm K"]) -> Float[Tensor, "m K"]:
         return dense[: len(dense) // len(self.place)].clone()
-
-
-class _InUnits(nn.Module):
-    """Weights of features that are read in units of their own."""
-
-    sizes: Tensor
-
-    def __init__(self, sizes: Float[np.ndarray, " K"]):
-        super().__init__()
-        self.register_buffer("sizes", torch.from_numpy(sizes.astype(np.float32)), persistent=False)
-
-    def forward(self, weight: Float[Tensor, "N K"]) -> Float[Tensor, "N K"]:
-        return weight / self.sizes
-
-    def right_inverse(self, weight: Float[Tensor, "N K"]) -> Float[Tensor, "N K"]:
-        # What was drawn for features of size 1 is drawn for these.
-        return weight
 
 
 class _TiedHidden(nn.Module):

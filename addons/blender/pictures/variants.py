@@ -13,14 +13,10 @@ from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
 from pns_common.mesh.topology import build_topology
-from pns_common.model.features import SIGNED_18
-from pns_common.operator.formula import Rule, pushes
-from pns_common.refinement import control_level
+from pns_common.parallel import Blocks
+from pns_common.schemes.limit import limit_normals, limit_positions
+from pns_common.schemes.loop import LOOP
 
-# N1 asks no network: pushes of strength 1 alone.
-N1 = Rule(
-    lambda features: np.zeros((len(features), 3)), SIGNED_18, True, 1.0, 1.0, prior_strength=1.0
-)
 # Triangles of one polygon turn by less; and quads that are joined of two bend and lean by less.
 FLAT, LEAN = radians(0.1), radians(40)
 
@@ -70,7 +66,11 @@ def subsurf_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
 
 def pushed_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     """Make N1: push each vertex once along its normal by what Loop takes in; then Loop."""
-    pushed = Mesh(mesh.vertices + pushes(control_level(mesh, loop()), N1), mesh.faces)
+    surface = mesh.topology(), Blocks(), LOOP
+    taken = mesh.vertices - limit_positions(mesh.vertices, *surface)
+    normals = limit_normals(mesh.vertices, *surface).vertices
+    heights = (taken * normals).sum(axis=1, keepdims=True)
+    pushed = Mesh(mesh.vertices + heights * normals, mesh.faces)
     return _beside_loop("N1, untrained", refine(pushed, loop(), levels), mesh, levels, {})
 
 

@@ -140,7 +140,7 @@ def test_models_are_listed_with_their_cards(client: TestClient) -> None:
     # One that does not load has nothing to say of itself.
     assert set(entries) == {"paper", "vertices", DEFAULT_MODEL}
     assert [name for name, entry in entries.items() if entry["default"]] == [DEFAULT_MODEL]
-    assert entries["vertices"]["vertex_features"] == "ring-10"
+    assert entries["vertices"]["features"] == "directed-28"
     for name, entry in entries.items():
         assert report(client, f"model={name}")["model_hash"] == entry["hash"]
     properties = client.get("/openapi.json").json()["components"]["schemas"]["ModelEntry"]

@@ -70,7 +70,7 @@ def test_a_file_that_does_not_load_keeps_no_other_from_its_work() -> None:
     models = serving(None)
     with pytest.raises(NoModelError, match="ONNX"):
         models.get("broken")
-    assert models.get("vertices").card.vertex_features == "ring-10"
+    assert models.get("vertices").card.features == "directed-28"
     with pytest.raises(NoModelError, match="missing"):
         serving("missing.onnx").get()
     assert serving("missing.onnx").get("paper").name == "paper"

@@ -5,8 +5,9 @@ vertices laid onto the shape; cages are split; triangles of all other pairs are 
 flat parts of them in n-gons, as modellers draw.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -32,6 +33,7 @@ from train.data.pairs.references import (
 )
 from train.data.pairs.solid import solid_pairs
 from train.data.remeshers import instant, laid_onto, with_points
+from train.data.simplifiers import Simplifier, isotropic
 from train.vectors import dot, face_normals, unit
 
 # How often a dense shape is remeshed in quads; else it is simplified and triangles are joined.
@@ -145,6 +147,19 @@ def in_polygons(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     first, second = np.ascontiguousarray((corners[rows] // 3).T)
     pair_up(first, second, free, chosen)
     return Mesh(points, [*parts, *quads[rows[chosen]], *mesh.faces[free]])
+
+
+def joined(mesh: Mesh, faces: int) -> Mesh:
+    """Remesh to one edge length, and join triangles to quads and flat parts to n-gons.
+
+    Raises:
+        MeshError: no face is left.
+    """
+    triangles = isotropic(mesh, 2 * faces)
+    return laid_onto(mesh, in_polygons(triangles, np.random.default_rng(faces)))
+
+
+REMESHERS: Mapping[str, Simplifier] = MappingProxyType({"instant": instant, "joined": joined})
 
 
 def _flat_parts(mesh: Mesh) -> tuple[list[np.ndarray], np.ndarray]:

@@ -24,8 +24,8 @@ from train.baselines.butterfly import modified_butterfly
 from train.baselines.controls import flat, n1
 from train.baselines.neural_subdivision import neural_subdivision
 from train.baselines.pn_triangles import pn_triangles
+from train.data.pairs.polygons import REMESHERS
 from train.data.pairs.references import Pair, Reference
-from train.data.remeshers import REMESHERS
 from train.data.sharp_labels import coarse_sharp_edges
 from train.data.simplifiers import SIMPLIFIERS
 from train.data.validation import Drawn, coarse_mesh, read_shape, validation_meshes
@@ -86,29 +86,13 @@ class ZeroNetworks:
         """The model's hash."""
         return self.model.hash
 
-    def __call__(self, features: np.ndarray, budget: float) -> np.ndarray:
-        """Return no correction of edges."""
-        return np.zeros((len(features), 3), dtype=np.float32)
-
-    def run(self, given: str, rows: np.ndarray) -> np.ndarray:
+    def run(self, given: str, rows: np.ndarray, budget: float = 1.0) -> np.ndarray:
         """Return what a network of directed edges answers, but for its corrections."""
-        made = np.array(self.model.run(given, rows))
+        made = np.array(self.model.run(given, rows, budget))
         if given == networks(self.card)[-1].given:
             made[:, : kernels.SHARPNESS] = 0.0
             made[:, kernels.FACE :] = 0.0
         return made
-
-    def vertex_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
-        """Return no correction of vertices."""
-        return np.zeros((len(features), 3), dtype=np.float32)
-
-    def face_correction(self, features: np.ndarray, budget: float) -> np.ndarray:
-        """Return no correction of face vertices."""
-        return np.zeros((len(features), 1), dtype=np.float32)
-
-    def sharpness(self, features: np.ndarray) -> np.ndarray:
-        """Return the model's own sharpness of edges."""
-        return self.model.sharpness(features)
 
 
 @dataclass(frozen=True, slots=True)

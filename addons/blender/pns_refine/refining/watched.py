@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from pns_common.model.card import ModelCard
-from pns_common.model.session import DirectedModel, Model, PolygonModel
+from pns_common.model.session import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,27 +40,9 @@ class WatchedModel:
         """The floating type in which features are best given."""
         return getattr(self.model, "feature_type", np.float64)
 
-    def __call__(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Return corrections of a block of edges."""
+    def run(
+        self, given: str, rows: Float[np.ndarray, "N K"], budget: float = 1.0
+    ) -> Float[np.ndarray, "N A"]:
+        """Return the answers of a network to a block of rows."""
         self.look_up()
-        return self.model(features, budget)
-
-    def vertex_correction(self, features: Float[np.ndarray, "N L"], budget: float) -> np.ndarray:
-        """Return corrections of a block of vertices."""
-        self.look_up()
-        return self.model.vertex_correction(features, budget)
-
-    def face_correction(self, features: Float[np.ndarray, "N K"], budget: float) -> np.ndarray:
-        """Return corrections of a block of faces."""
-        self.look_up()
-        return cast(PolygonModel, self.model).face_correction(features, budget)
-
-    def run(self, given: str, rows: Float[np.ndarray, "N K"]) -> np.ndarray:
-        """Return the answers of a network of directed edges."""
-        self.look_up()
-        return cast(DirectedModel, self.model).run(given, rows)
-
-    def sharpness(self, features: Float[np.ndarray, "N P"]) -> np.ndarray:
-        """Return the sharpness of a block of edges."""
-        self.look_up()
-        return self.model.sharpness(features)
+        return self.model.run(given, rows, budget)

@@ -19,7 +19,7 @@ from tests.support.gltf.shapes import box, octahedron
 from tests.support.networks import default_model, random_model
 
 # Boundaries and creases are Loop's.
-MODEL = default_model(boundary_strength=0.0)
+MODEL = default_model(boundary_strength=0.0, budget=0.5)
 
 
 def subdivide(*meshes, model=MODEL, **options):
