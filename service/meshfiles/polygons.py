@@ -136,7 +136,7 @@ def refine_polygons(
         degenerate=len(mesh.sizes) - len(control.faces),
         copies=0,
         report=made.report,
-        bends=count_bends(control.mesh, creases)[0],
+        bends=count_bends(control.mesh, creases, options)[0],
         changes=[*changes, *near_miss_changes(misses, "")],
     )
 
