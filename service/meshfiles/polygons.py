@@ -74,7 +74,7 @@ class Refined:
         degenerate: number of faces without three different vertices.
         copies: number of faces with the vertices of an earlier face.
         report: the operator's.
-        bends: bent edges, and the sharp ones among them.
+        bends: steep edges, and those in doubt.
         changes: what was joined or dropped.
     """
 

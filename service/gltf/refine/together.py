@@ -70,7 +70,7 @@ class MeshOutcome:
         copies: number of faces with the vertices of an earlier face.
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
-        bends: bent edges, and the sharp ones among them.
+        bends: steep edges, and those in doubt.
         parents: what each refined vertex is made of, if asked for: rows of the primitives, one
             primitive after the other.
     """
