@@ -26,7 +26,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(said.length);
     assert.deepEqual(said.filter((text) => /Upload|Waiting/.test(text)), []);
     assert.equal(await page.textContent("#file-name"), "example.glb");
-    assert.match(await page.textContent("#label-right"), /· 5,952 faces/);
+    assert.match(await page.textContent("#label-right"), /· 15,744 faces/);
     assert.ok(await page.isVisible("#invitation"));
     assert.ok(await page.isHidden("#welcome"));
     await choose(page, TETRAHEDRON);
@@ -285,7 +285,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await page.unroute(/\/subdivide\?/);
     await page.focus("#levels");
     await page.selectOption("#levels", "1");
-    await page.locator("#label-right", { hasText: "1,488 faces" }).waitFor();
+    await page.locator("#label-right", { hasText: "3,936 faces" }).waitFor();
     await settled(page);
     assert.equal(await focused(), "levels");
   });
