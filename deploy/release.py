@@ -32,7 +32,14 @@ def main() -> None:
     requirements.write_text("\n".join(path.read_text() for path in PINS))
     with tempfile.TemporaryDirectory() as folder:
         python = installed(Path(folder), wheel, requirements)
-        run("cyclonedx-py", "environment", python, "--output-reproducible", "-o", OUT / "sbom.cdx.json")
+        run(
+            "cyclonedx-py",
+            "environment",
+            python,
+            "--output-reproducible",
+            "-o",
+            OUT / "sbom.cdx.json",
+        )
     left_out = [*addons(wheel), *image(wheel)]
     files = sorted(path for path in OUT.iterdir() if path.is_file())
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files]

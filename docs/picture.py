@@ -45,7 +45,9 @@ def main() -> None:
         creases = sharp_edges(mesh, SPLIT)
         panels = {
             "Loop": refine(mesh, loop(), LEVELS).mesh,
-            "PN triangles": refine_by_method(mesh, pn_triangles(SPLIT), LEVELS, creases=creases).mesh,
+            "PN triangles": refine_by_method(
+                mesh, pn_triangles(SPLIT), LEVELS, creases=creases
+            ).mesh,
             "PNS": subdivide(mesh, LEVELS),
             "Original": original,
         }
@@ -71,17 +73,25 @@ def show(
     """Draw a mesh under its title, seen from a direction."""
     plotter.subplot(*place)
     surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
-    shading = {} if flat else {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 30}
-    plotter.add_mesh(surface, color=CLAY, show_edges=flat, edge_color=EDGES, specular=0.2, **shading)
+    shading = (
+        {} if flat else {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 30}
+    )
+    plotter.add_mesh(
+        surface, color=CLAY, show_edges=flat, edge_color=EDGES, specular=0.2, **shading
+    )
     plotter.add_text(title, position="lower_edge", font_size=11, color="#30343a")
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
-    plotter.camera_position = [centre + 4 * radius * np.array(towards) / np.linalg.norm(towards), centre, (0, 1, 0)]
+    plotter.camera_position = [
+        centre + 4 * radius * np.array(towards) / np.linalg.norm(towards),
+        centre,
+        (0, 1, 0),
+    ]
     plotter.camera.zoom(1.05)
 
 
 def distance(made: Mesh, original: Mesh) -> float:
-    """Return the mean distance of two surfaces, of the side where it is larger, in % of the size."""
+    """Return the mean distance of two surfaces, from the side where it is larger, in % of size."""
     size = np.linalg.norm(np.ptp(original.vertices, axis=0))
     sides = [trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in (made, original)]
     means = []
@@ -96,11 +106,13 @@ def distance(made: Mesh, original: Mesh) -> float:
 def example(face: Mesh) -> bytes:
     """Return a stone head on a plinth as a GLB without normals."""
     scene = trimesh.Scene()
-    # The page looks from 30 degrees beside the front: the face is on the right, where the result is.
+    # The page looks from 30 degrees beside the front: the face is on the side of the result.
     turned = Mesh(face.vertices @ rotation_matrix(-np.pi / 3, [0, 1, 0])[:3, :3], face.faces)
     for name, mesh, (colour, rough) in (("head", turned, STONE), ("plinth", plinth(0.35), SLATE)):
         shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        look = PBRMaterial(name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=rough)
+        look = PBRMaterial(
+            name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=rough
+        )
         shape.visual = trimesh.visual.TextureVisuals(material=look)
         scene.add_geometry(shape, geom_name=name, node_name=name)
     return trimesh.exchange.gltf.export_glb(scene, include_normals=False)

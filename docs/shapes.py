@@ -1,6 +1,6 @@
 """Shapes of the pictures, made by code: each dense, to be simplified and refined back.
 
-A body is a field of signed distances, joined by smooth minima; its surface is taken by VTK's contour.
+A body is a field of signed distances, joined by smooth minima; VTK's contour is its surface.
 """
 
 from __future__ import annotations
@@ -85,12 +85,19 @@ def head() -> Mesh:
     eyes: list[Field] = [partial(ball, (x, 0.27, 0.6), (0.19, 0.13, 0.2)) for x in (-0.27, 0.27)]
     body = partial(joined, parts, 0.1)
     whole = partial(carved, body, partial(joined, eyes, 0.01), 0.06)
-    return surface(lambda p: np.maximum(whole(p), -1.45 - p[:, 1]), (-1, -1.55, -0.9), (1, 1.4, 1.1), 110)
+    return surface(
+        lambda p: np.maximum(whole(p), -1.45 - p[:, 1]), (-1, -1.55, -0.9), (1, 1.4, 1.1), 110
+    )
 
 
 def tree() -> Mesh:
     """Return a tree with roots, boughs and a crown."""
-    crown = [(0, 1.5, 0, 0.62), (0.55, 1.15, 0.1, 0.42), (-0.5, 1.2, 0.2, 0.45), (0.1, 1.2, -0.5, 0.42)]
+    crown = [
+        (0, 1.5, 0, 0.62),
+        (0.55, 1.15, 0.1, 0.42),
+        (-0.5, 1.2, 0.2, 0.45),
+        (0.1, 1.2, -0.5, 0.42),
+    ]
     parts: list[Field] = [partial(rod, (0, -0.9, 0), (0.05, 0.5, 0), 0.2, 0.13)]
     for turn in np.arange(5) * 2 * np.pi / 5:
         x, z = np.cos(turn), np.sin(turn)
