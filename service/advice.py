@@ -109,7 +109,7 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
             f"clearly round: use crease=off for a body that is round throughout, or "
             f"crease=angle:{STEEP} for flat sides with crisp edges"
         ]
-    if edges["boundary"] >= MOST_OPEN * total:
+    if edges["boundary"] >= MOST_OPEN * total and not _is_one_face(levels[0]):
         return [
             f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
@@ -118,3 +118,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     if flat and not edges.get("crease") and not edges.get("soft"):
         return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
     return []
+
+
+def _is_one_face(level: LevelReport) -> bool:
+    """Return whether a level refined a single face, which has no other to be joined with.
+
+    A triangle becomes four, with three new vertices; a polygon of n corners n quads, with n + 1.
+    """
+    border = level["edges"]["boundary"]
+    return level["faces"] in (4, border) and level["vertices"] <= 2 * border + 1
