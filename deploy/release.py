@@ -40,13 +40,18 @@ def main() -> None:
             "-o",
             OUT / "sbom.cdx.json",
         )
-    left_out = [*addons(wheel), *image(wheel)]
+    finished([*addons(wheel), *image(wheel)])
+
+
+def finished(left_out: list[str]) -> None:
+    """Write the sums of all files, and say what there is and what was left out."""
     files = sorted(path for path in OUT.iterdir() if path.is_file())
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files]
     (OUT / "SHA256SUMS").write_text("".join(sums))
     for path in files:
         print(f"{path.stat().st_size:>12,}  {path.relative_to(ROOT)}")
-    print("\n".join(f"left out: {text}" for text in left_out))
+    for text in left_out:
+        print(f"left out: {text}")
 
 
 def installed(folder: Path, wheel: Path, requirements: Path) -> Path:
@@ -81,9 +86,13 @@ def addons(wheel: Path) -> list[str]:
 
 
 def image(wheel: Path) -> list[str]:
-    """Save the container's image; return why not where there is no Docker."""
-    if shutil.which("docker") is None:
-        return ["image: there is no docker here"]
+    """Save the container's image; return why not where no Docker answers."""
+    known = shutil.which("docker")
+    if (
+        known is None
+        or subprocess.run((known, "info"), capture_output=True, check=False).returncode
+    ):
+        return ["image: no docker answers here"]
     tag = f"pns:{wheel.name.split('-')[1]}"
     run("docker", "build", "--tag", tag, ROOT)
     archive = OUT / f"{tag.replace(':', '-')}-image.tar.gz"
