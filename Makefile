@@ -2,6 +2,7 @@
 # node for some of the tests.
 PYTHON ?= python3
 SERVE  := .venv-serve
+RELEASE := .venv-release
 DEV    := .venv
 BLENDER := .venv-blender
 CLIENTS := .venv-clients
@@ -27,7 +28,7 @@ COMPILED := pns_common/kernels/compiled.abi3.so
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: prose size bench bench-answers hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web
+.PHONY: prose size bench bench-answers hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web release pictures
 
 serve: $(SERVE)/.ready
 	@$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
@@ -102,7 +103,7 @@ MODELS ?= paper signed general general-quad
 models: $(DEV)/.ready
 	set -e; for recipe in $(MODELS); do \
 	  $(DEV)/bin/python train/run.py train --recipe $$recipe; \
-	  $(DEV)/bin/python export/run.py --checkpoint checkpoints/$$recipe.safetensors --install; \
+	  $(DEV)/bin/python export/run.py --checkpoint build/checkpoints/$$recipe.safetensors --install; \
 	done
 
 # Honest and hostile clients at one service: SOAK='--minutes 1440' for a day.
@@ -183,7 +184,11 @@ web: web/node_modules/.ready
 web-test: $(DEV)/.ready web/node_modules/.ready
 	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=2 test/*.test.mjs
 
-# The pictures of README and docs, and how fast the page is on this machine.
+# README's sheet and the page's example, of shapes made by code; then `make web`.
+pictures: kernels
+	$(DEV)/bin/python docs/picture.py
+
+# The pictures of the page, and how fast the page is on this machine.
 web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready
 	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node $*.mjs
 
@@ -266,5 +271,15 @@ build/bench/.ready: $(wildcard benchmarks/peers/*.cpp benchmarks/peers/*.hpp)
 	-$(DRIVER) benchmarks/peers/openmesh.cpp -o $(@D)/openmesh -lOpenMeshTools -lOpenMeshCore
 	touch $@
 
+# All that users install, in dist/release: wheel, source, pinned requirements, Blender's zips, the image where there
+# is a docker, a bill of materials and the sums. A fresh environment is installed from these files, and refines.
+release: $(RELEASE)/.ready
+	$(RELEASE)/bin/python deploy/release.py
+
+$(RELEASE)/.ready: requirements/build.in
+	$(PYTHON) -m venv $(RELEASE)
+	$(RELEASE)/bin/python -m pip install --quiet build jaxtyping numpy --requirement requirements/build.in
+	touch $@
+
 clean:
-	rm -rf $(SERVE) $(DEV) $(CLIENTS) $(PEERS) $(INTEROP) $(BLENDER)-* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules web/node_modules results/cache
+	rm -rf $(SERVE) $(DEV) $(RELEASE) $(CLIENTS) $(PEERS) $(INTEROP) $(BLENDER)-* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis tests/node/node_modules web/node_modules results/cache

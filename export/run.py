@@ -41,7 +41,7 @@ def bundled_file(recipe: Recipe) -> Path | None:
     return FILE_OF_RECIPE[recipe.name] if bundled else None
 
 
-PUBLISHED_MODELS = Path("checkpoints/published")
+PUBLISHED_MODELS = Path("build/checkpoints/published")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -49,7 +49,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 @app.command()
 def main(
     checkpoint: Annotated[Path, typer.Option(help="What `train/run.py` wrote.")] = Path(
-        "checkpoints/paper.safetensors"
+        "build/checkpoints/paper.safetensors"
     ),
     published: Annotated[
         Path | None, typer.Option(help="The author's published data: export its networks.")

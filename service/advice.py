@@ -1,9 +1,8 @@
-"""Say why a refinement changed little, and which option changes that."""
+"""Say where the result is in doubt, or why little changed, and which option changes that."""
 
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,78 +13,117 @@ from pns_common.mesh.creases import Creases, edge_cosines
 from pns_common.mesh.mesh import Mesh
 from pns_common.report import LevelReport
 
+from .options import Options
+
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
-# From this share of bent edges that stay sharp on, a shape looks faceted.
-MANY_SHARP = 0.5
-# Degrees. The first is offered that keeps at most this share of what stays sharp now.
-ANGLES = range(40, 180, 20)
-FEWER = 0.5
+# Degrees: facets of a round shape rarely bend by more than the first, or by the second at all.
+STEEP, STEEPEST = 40, 60
+# A weight between these is neither sharp nor smooth.
+UNDECIDED = 0.2, 0.8
+# Doubt is spoken of from this many edges on, if they are this share of the steep ones.
+MANY, SHARE = 10, 0.5
+# The share of bent edges that bend most from which on a shape without a sharp edge looks wrong.
+CRUMBLES = 0.1
 # From this share of borders on, faces do not hang together.
 MOST_OPEN = 0.9
 
 
 @dataclass(frozen=True)
 class Bends:
-    """Number of bent edges of a control mesh, of those kept sharp, of those beyond each angle."""
+    """Number of bent edges of control meshes whose sharp edges were to be found.
 
-    bent: int = 0
-    sharp: int = 0
-    steep: tuple[int, ...] = (0,) * len(ANGLES)
+    Attributes:
+        steep, undecided: those above STEEP degrees, and those of them that are neither sharp nor
+            smooth.
+        smoothed: those above STEEPEST in meshes that keep no edge though many bend so.
+    """
+
+    steep: int = 0
+    undecided: int = 0
+    smoothed: int = 0
 
     def __add__(self, other: Bends) -> Bends:
         """Count the edges of both."""
-        steep = tuple(map(operator.add, self.steep, other.steep))
-        return Bends(self.bent + other.bent, self.sharp + other.sharp, steep)
+        return Bends(
+            self.steep + other.steep,
+            self.undecided + other.undecided,
+            self.smoothed + other.smoothed,
+        )
 
 
 NO_BENDS = Bends()
 
 
 def count_bends(
-    mesh: Mesh, creases: Creases, parts: int = 1, part_of_face: Int[np.ndarray, " F"] | None = None
+    mesh: Mesh,
+    creases: Creases,
+    options: Options,
+    parts: int = 1,
+    part_of_face: Int[np.ndarray, " F"] | None = None,
 ) -> list[Bends]:
-    """Count the bent edges of each part of a mesh, and the sharp ones among them.
+    """Count the bent edges of each part of a mesh, and those of them that are in doubt.
 
-    Without `part_of_face` the mesh is one part. Nothing is counted where no sharp edges are asked
-    for.
+    Without `part_of_face` the mesh is one part. Nothing is counted where the options say which
+    edges are sharp, or where none was looked for.
     """
-    if creases.named is None:
+    if options.crease != "auto" or creases.named is None:
         return [NO_BENDS] * parts
     topology = mesh.topology()
-    cosines = edge_cosines(mesh.vertices, topology)
-    bent = np.flatnonzero(cosines < math.cos(BENT))
-    steep = [cosines[bent] < math.cos(math.radians(angle)) for angle in ANGLES]
-    sharp = creases.applied_by_name(topology).is_sharp[bent]
-    part = np.zeros(len(bent), dtype=np.int64)
+    angles = np.arccos(np.clip(edge_cosines(mesh.vertices, topology), -1.0, 1.0))
+    marked = creases.applied_by_name(topology)
+    weight = marked.sharpness
+    low, high = UNDECIDED
+    bent, steep = angles > BENT, angles > math.radians(STEEP)
+    kinds = (
+        bent,
+        bent & marked.is_sharp,
+        steep,
+        steep & (weight > low) & (weight < high),
+        angles > math.radians(STEEPEST),
+    )
+    part = np.zeros(len(angles), dtype=np.int64)
     if part_of_face is not None:
-        part = part_of_face[topology.half_edges[bent, 0] // 3]
-    counts = [
-        np.bincount(part[chosen], minlength=parts).tolist() for chosen in (..., sharp, *steep)
+        part = part_of_face[topology.half_edges[:, 0] // 3]
+    counts = [np.bincount(part[kind], minlength=parts).tolist() for kind in kinds]
+    return [
+        Bends(steep, undecided, 0 if sharp or most < CRUMBLES * bent else most)
+        for bent, sharp, steep, undecided, most in zip(*counts, strict=True)
     ]
-    return [Bends(bent, sharp, tuple(steep)) for bent, sharp, *steep in zip(*counts, strict=True)]
 
 
 def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
-    """Return the reasons why a shape changed little, each with the option to set."""
+    """Return what is in doubt, or why little changed, each with the option to set."""
     if not levels:
         return []
     edges = levels[0]["edges"]
-    creases = edges.get("crease", 0)
-    total = creases + sum(edges[kind] for kind in ("interior", "boundary", "irregular"))
-    if bends.bent and bends.sharp >= MANY_SHARP * bends.bent:
-        kept = f"{bends.sharp:,} of {bends.bent:,} bent edges are kept sharp: use"
-        for angle, steep in zip(ANGLES, bends.steep, strict=True):
-            if 0 < steep <= FEWER * bends.sharp:
-                return [f"{kept} crease=angle:{angle}, which keeps {steep:,}, for a rounder shape"]
-        touching = edges["boundary"] or edges["irregular"]
-        risk = "; gaps may open where pieces touch" if touching else ""
-        return [f"{kept} crease=off to round all of them{risk}"]
-    if edges["boundary"] >= MOST_OPEN * total:
+    total = sum(edges.get(kind, 0) for kind in ("interior", "boundary", "irregular", "crease"))
+    if bends.smoothed >= MANY:
+        return [
+            f"no edge is kept sharp where {bends.smoothed:,} bend by more than {STEEPEST} degrees: "
+            f"use crease=angle:{STEEP} for flat sides with crisp edges"
+        ]
+    if bends.undecided >= max(MANY, SHARE * bends.steep):
+        return [
+            f"{bends.undecided:,} of {bends.steep:,} steep edges are neither clearly sharp nor "
+            f"clearly round: use crease=off for a body that is round throughout, or "
+            f"crease=angle:{STEEP} for flat sides with crisp edges"
+        ]
+    if edges["boundary"] >= MOST_OPEN * total and not _is_one_face(levels[0]):
         return [
             f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
         ]
-    if levels[-1]["normal_jump_max"] < BENT and not creases and not edges.get("soft"):
+    flat = levels[-1]["normal_jump_max"] < BENT
+    if flat and not edges.get("crease") and not edges.get("soft"):
         return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
     return []
+
+
+def _is_one_face(level: LevelReport) -> bool:
+    """Return whether a level refined a single face, which has no other to be joined with.
+
+    A triangle becomes four, with three new vertices; a polygon of n corners n quads, with n + 1.
+    """
+    border = level["edges"]["boundary"]
+    return level["faces"] in (4, border) and level["vertices"] <= 2 * border + 1

@@ -57,7 +57,7 @@ class UnreadableError(ServiceError):
 
     status = 400
     code = "unreadable"
-    title = "The upload cannot be read"
+    title = "The file cannot be read"
 
 
 class LimitError(ServiceError):

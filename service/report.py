@@ -68,7 +68,7 @@ class MeshResult:
         degenerate: dropped faces of the control mesh.
         copies: faces of the control mesh that follow another with the same vertices.
         report: the operator's; None where no face was left, and the mesh stays as it was.
-        bends: its bent edges, and the sharp ones among them.
+        bends: its steep edges, and those in doubt.
         name: what the file calls it; None without a name.
     """
 

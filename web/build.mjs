@@ -94,6 +94,7 @@ async function licences() {
   const parts = [
     ["three.js", "node_modules/three/LICENSE"],
     ["fflate, within three.js", "node_modules/fflate/LICENSE"],
+    ["three-mesh-bvh", "node_modules/three-mesh-bvh/LICENSE"],
     ["meshoptimizer's decoder, within three.js", "node_modules/meshoptimizer/LICENSE.md"],
     ["Draco's decoder, within three.js", "licences/draco.txt"],
     ["Basis Universal's transcoder, within three.js", "licences/basis_universal.txt"],

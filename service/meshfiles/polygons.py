@@ -74,7 +74,7 @@ class Refined:
         degenerate: number of faces without three different vertices.
         copies: number of faces with the vertices of an earlier face.
         report: the operator's.
-        bends: bent edges, and the sharp ones among them.
+        bends: steep edges, and those in doubt.
         changes: what was joined or dropped.
     """
 
@@ -136,7 +136,7 @@ def refine_polygons(
         degenerate=len(mesh.sizes) - len(control.faces),
         copies=0,
         report=made.report,
-        bends=count_bends(control.mesh, creases)[0],
+        bends=count_bends(control.mesh, creases, options)[0],
         changes=[*changes, *near_miss_changes(misses, "")],
     )
 

@@ -139,6 +139,8 @@ class Catalogue:
 
 def catalogue_of(models: Models) -> Catalogue:
     """Read the catalogue, in a worker; a model that does not load has a name and no entry."""
+    from pns_common.model.file import COMPANIONS
+
     sources, served = models.sources, models.served
     entries: list[ModelEntry] = []
     # A served file may be called like a bundled model; it is none of the names then.
@@ -149,6 +151,12 @@ def catalogue_of(models: Models) -> Catalogue:
             log.warning("%s", error)
         else:
             entries.append(_entry(model, default=source == served))
+            of_polygons = entries[-1].base == "catmull-clark" or model.name in COMPANIONS
+            if source == served and not of_polygons:
+                log.warning(
+                    "model %s has no companion for polygons: Catmull-Clark refines them without it",
+                    model.name,
+                )
     entries.sort(key=lambda entry: (entry.name, entry.default))
     return Catalogue(tuple(sorted(sources)), _ENTRIES.dump_json(entries))
 

@@ -1,72 +1,128 @@
-"""advice: why little changed, and the option that changes it."""
+"""advice: where the result is in doubt or little changed, and the option that helps."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pytest
 
-from pns_common import loop
+from pns_common import Creases, Mesh, load_model
+from service.advice import NO_BENDS, Bends, advice_on, count_bends
 from service.gltf.subdivide import subdivide_gltf
-from service.meshfiles.convert import as_flags
-from service.meshfiles.mesh_file import of_triangles
-from service.meshfiles.refine_mesh_file import refine_mesh_file
+from service.meshfiles.convert import as_flags, converted
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf.files import glb
 from tests.support.gltf.shapes import box, octahedron
 
-CUBE = "12 of 12 bent edges are kept sharp: use crease=off to round all of them"
+AUTO = Options()
+
+
+def report_of(*meshes, **options):
+    chosen = Options(**{"scheme": "loop"} | options)
+    model = load_model() if chosen.scheme == "auto" else None
+    data = glb(*([mesh] for mesh in meshes))
+    return subdivide_gltf(data, "glb", chosen, model, Limits()).report
 
 
 def advice(*meshes, **options):
-    chosen = Options(**{"scheme": "loop"} | options)
-    return subdivide_gltf(glb(*meshes), "glb", chosen, None, Limits()).report["advice"]
+    return report_of(*meshes, **options)["advice"]
 
 
-def test_a_cube_of_sharp_edges_says_how_it_gets_round():
-    # A quad's diagonal does not bend.
-    assert advice([box()], crease="angle:60") == [CUBE]
+def mesh_of(shape):
+    return Mesh(shape["POSITION"].astype(np.float64), np.reshape(shape["indices"], (-1, 3)))
 
 
-def test_a_shape_that_gets_round_says_nothing():
-    assert advice([box()], crease="off") == []
-    # Two rims of eight are sharp; the eight sides are not.
-    (line,) = advice([cylinder()], crease="angle:60")
-    assert line.startswith("16 of 24 ")
-    assert advice([cylinder()], crease="angle:100") == []
+def prism(sides):
+    """A drum of two rings, whose rims bend by 90 degrees."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    low, high = (np.column_stack([ring, np.full(sides, z)]) for z in (-1.0, 1.0))
+    here, there = np.arange(sides), (np.arange(sides) + 1) % sides
+    walls = [[here, there, sides + there], [here, sides + there, sides + here]]
+    bottom, top = np.full(sides, 2 * sides), np.full(sides, 2 * sides + 1)
+    faces = [*walls, [there, here, bottom], [sides + here, sides + there, top]]
+    points = np.vstack([low, high, [[0, 0, -1], [0, 0, 1]]])
+    return Mesh(points, np.concatenate([np.column_stack(each) for each in faces]))
 
 
-def test_an_angle_is_offered_that_keeps_at_most_half():
-    # A cube's 12 edges bend by 90 degrees, an octahedron's 12 by 70.5.
-    (line,) = advice([box()], [octahedron()], crease="angle:60")
-    assert line == (
-        "24 of 24 bent edges are kept sharp: "
-        "use crease=angle:80, which keeps 12, for a rounder shape"
+def as_gltf(mesh):
+    return {"POSITION": mesh.vertices.astype(np.float32), "indices": mesh.faces.reshape(-1)}
+
+
+def weighted(mesh, weight):
+    """Creases as the network gives them: one weight at every edge."""
+    edges = mesh.topology().edges.astype(np.int64)
+    return Creases(edges, np.full(len(edges), weight))
+
+
+@pytest.mark.parametrize("shape", [box(), cylinder(), as_gltf(prism(12)), as_gltf(prism(32))])
+def test_sharp_parts_are_never_offered_a_rounder_shape(shape):
+    assert advice(shape, scheme="auto") == []
+
+
+@pytest.mark.parametrize("crease", ["off", "angle:60", "angle:100", "normals"])
+def test_who_says_which_edges_are_sharp_is_not_asked_again(crease):
+    assert advice(box(), octahedron(), scheme="auto", crease=crease) == []
+
+
+def test_a_scheme_that_looks_for_no_edges_has_no_doubt():
+    assert advice(box(), octahedron()) == []
+
+
+@pytest.mark.parametrize(
+    ("weight", "expected"),
+    [(0.0, Bends(12, 0, 12)), (0.5, Bends(12, 12, 12)), (0.51, Bends(12, 12)), (1.0, Bends(12))],
+)
+def test_an_edge_is_undecided_between_a_fifth_and_four_fifths(weight, expected):
+    # An octahedron's 12 edges bend by 70.5 degrees.
+    mesh = mesh_of(octahedron())
+    assert count_bends(mesh, weighted(mesh, weight), AUTO) == [expected]
+
+
+def test_each_part_is_counted_alone():
+    one = mesh_of(octahedron())
+    two = Mesh(
+        np.vstack([one.vertices, one.vertices + 5]),
+        np.vstack([one.faces, one.faces + len(one.vertices)]),
     )
+    edges = two.topology().edges.astype(np.int64)
+    sharp = (edges < len(one.vertices)).all(axis=1)
+    parts = np.repeat([0, 1], len(one.faces))
+    creases = Creases(edges, sharp.astype(np.float64))
+    # The first keeps all of its edges; that of the second says nothing about it.
+    assert count_bends(two, creases, AUTO, 2, parts) == [Bends(12), Bends(12, 0, 12)]
 
 
-def test_who_rounds_all_is_warned_of_gaps_where_pieces_have_borders():
-    shape = box()
-    opened = {"POSITION": shape["POSITION"], "indices": np.reshape(shape["indices"], -1)[6:]}
-    (line,) = advice([opened], crease="angle:60")
-    assert line.endswith("use crease=off to round all of them; gaps may open where pieces touch")
+LEVEL = report_of(octahedron())["levels"]
 
 
-@pytest.mark.parametrize("alone", [False, True])
-def test_the_meshes_of_a_file_count_together(alone, monkeypatch):
-    if alone:
-        monkeypatch.setattr("service.gltf.refine.meshes.MOST_FACES", -1)
-    assert advice([box()], [box()], crease="angle:60") == [CUBE.replace("12", "24")]
-    # All of an octahedron's edges bend, and by 70 degrees.
-    assert advice([box()], [octahedron()], crease="angle:80") == [CUBE.replace("of 12", "of 24")]
-    assert advice([box()], *[[octahedron()]] * 4, crease="angle:80") == []
+def test_a_doubt_names_the_two_pictures_that_it_may_lead_to():
+    (line,) = advice_on(LEVEL, Bends(40, 22))
+    assert line == (
+        "22 of 40 steep edges are neither clearly sharp nor clearly round: use crease=off for a "
+        "body that is round throughout, or crease=angle:40 for flat sides with crisp edges"
+    )
+    assert re.findall(r"--crease \S+", as_flags(line)) == ["--crease off", "--crease angle:40"]
+
+
+def test_a_part_that_keeps_no_edge_is_spoken_of_first():
+    (line,) = advice_on(LEVEL, Bends(40, 40, 14))
+    assert line.startswith("no edge is kept sharp where 14 bend by more than 60 degrees: use")
+    assert "crease=angle:40 for flat sides" in line
+
+
+@pytest.mark.parametrize("bends", [NO_BENDS, Bends(12, 9), Bends(100, 49), Bends(40, 0, 9)])
+def test_few_edges_are_no_doubt(bends):
+    assert advice_on(LEVEL, bends) == []
 
 
 def test_triangles_that_share_no_vertex_say_how_to_join_them():
     shape = octahedron()
     corners = shape["POSITION"][np.reshape(shape["indices"], -1)].astype(np.float64)
     apart = corners + 1e-5 * np.arange(len(corners))[:, None]
-    (line,) = advice([{"POSITION": apart.astype(np.float32), "indices": np.arange(24)}])
+    (line,) = advice({"POSITION": apart.astype(np.float32), "indices": np.arange(24)})
     assert line.startswith("24 of 24 edges are open borders")
     assert "weld_tolerance=" in line
 
@@ -76,16 +132,17 @@ def test_a_flat_sheet_says_that_it_is_flat():
         "POSITION": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32),
         "indices": np.array([0, 1, 2, 2, 1, 3]),
     }
-    (line,) = advice([sheet])
+    (line,) = advice(sheet)
     assert line.startswith("the shape is flat")
 
 
-def test_mesh_files_say_the_same_and_the_command_spells_its_own_options():
-    cube = box()
-    triangles = of_triangles(
-        cube["POSITION"].astype(np.float64), np.reshape(cube["indices"], (-1, 3))
-    )
-    chosen = Options(scheme="loop", crease="angle:60")
-    _, report = refine_mesh_file(triangles, loop(), chosen, Limits())
-    assert report["advice"] == [CUBE]
-    assert as_flags(report["advice"][0]) == CUBE.replace("crease=", "--crease ")
+@pytest.mark.parametrize("faces", ["f 1 2 3", "f 1 2 3 4", "f 1 2 3 4 5"])
+@pytest.mark.parametrize("count", [1, 2])
+def test_only_faces_that_have_others_are_to_be_joined(faces, count):
+    corners = [(0, 0), (2, 0), (2, 2), (1, 3), (0, 2)]
+    lines = [f"v {x + 9 * k} {y} 0" for k in range(count) for x, y in corners]
+    lines += [faces, faces.translate(str.maketrans("12345", "6789X")).replace("X", "10")][:count]
+    options = Options(scheme="loop" if faces == "f 1 2 3" else "catmull-clark")
+    made = converted("\n".join(lines).encode(), "obj", "obj", options, None, Limits())
+    (line,) = made.report["advice"]
+    assert ("weld_tolerance" in line) == (count == 2)

@@ -206,6 +206,12 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
         misspelt = runner.invoke(train.run.app, ["reproduce", "counting", *output, *missing])
         assert (misspelt.exit_code, counting.runs) == (2, 0)
         assert folder in misspelt.output
+    listed = runner.invoke(train.run.app, ["reproduce", "--list"])
+    assert listed.exit_code == 0
+    lines = listed.output.splitlines()
+    assert [line.split()[0] for line in lines] == ["counting", "needing"]
+    assert lines[1].endswith("needs --published DIR)")
+    assert counting.runs == 0
     everything = runner.invoke(train.run.app, ["reproduce", *output])
     assert everything.exit_code == 0
     assert counting.runs == 1

@@ -31,6 +31,9 @@ INSTALLED = Path("results")
 
 def reproduce_command(
     name: Annotated[str | None, typer.Argument(help="One experiment; all if not given.")] = None,
+    listed: Annotated[
+        bool, typer.Option("--list", help="Name the experiments and what each needs, and end.")
+    ] = False,
     checkpoints: Annotated[
         Path | None,
         typer.Option(
@@ -66,6 +69,10 @@ def reproduce_command(
 ) -> None:
     """Make the paper's tables and figures again, and those that it leaves open."""
     console = Console()
+    if listed:
+        for experiment in EXPERIMENTS.values():
+            console.print(_line(experiment), markup=False, highlight=False, soft_wrap=True)
+        return
     try:
         chosen = _chosen(name, published, assets)
         output = INSTALLED if install else output
@@ -114,6 +121,13 @@ def run_all(
     before = page.read_text(encoding="utf-8") if page.is_file() else ""
     page.write_text(markdown_page(EXPERIMENTS, _records(output), before), encoding="utf-8")
     console.print(f"{escape(str(page))} written", soft_wrap=True)
+
+
+def _line(experiment: Experiment) -> str:
+    needs = {"--published DIR": experiment.needs_published, "--assets DIR": experiment.needs_assets}
+    options = "".join(f", needs {option}" for option, needed in needs.items() if needed)
+    minutes = max(1, round(experiment.seconds / 60))
+    return f"{experiment.name:<22} {experiment.title} (about {minutes} min{options})"
 
 
 def _chosen(name: str | None, published: Path | None, assets: Path | None) -> list[Experiment]:

@@ -23,13 +23,13 @@ from train.models.recipes import RECIPES
 from train.models.torch_model import recipe_model
 from train.output_file import prepare_output
 
-CHECKPOINTS = Path("checkpoints")
+CHECKPOINTS = Path("build/checkpoints")
 
 Output = Annotated[
     Path | None,
     typer.Option(
         dir_okay=False,
-        help="Checkpoint to write; checkpoints/RECIPE.safetensors if not given.",
+        help="Checkpoint to write; build/checkpoints/RECIPE.safetensors if not given.",
     ),
 ]
 

@@ -1,7 +1,8 @@
 /** Fill the panel: what a result's report and file say, and what is measured on it. */
 
 import { isAbort } from "./api/problem";
-import { distances, distanceFrom, largestLength, rounding } from "./measure/distance";
+import { closeness, type Closeness } from "./measure/closeness";
+import { distances, largestLength, rounding } from "./measure/distance";
 import { surfaceOf } from "./measure/surface";
 import type { Lengths } from "./report/promises";
 import type { Result } from "./result";
@@ -35,8 +36,11 @@ const STAGES: Record<string, string> = {
   opening: "Opening the result",
 };
 
-const moves = new WeakMap<Model, number | null>();
-let validation = new AbortController();
+/** How far results are from their files. */
+const apart = new WeakMap<Model, Closeness | null>();
+/** What is certified on the page. */
+let certified: Parameters<typeof certify> | null = null;
+let [validation, measurement] = [new AbortController(), new AbortController()];
 /** Facts of the file that is shown. */
 let facts: { source: Source; before: Before } | null = null;
 
@@ -55,30 +59,34 @@ export function describe(
     ["From request to picture", milliseconds / 1000],
   ]);
   void validateBoth(ours, source);
+  void measure(ours, source);
 }
 
 /** Show what is certain of a result; returns it in a sentence. */
 export function certify(ours: Result, source: Source, loop: Result | null, scale: Scale): string {
-  return showPromises(ours.report, lengths(ours, source, loop, scale));
+  certified = [ours, source, loop, scale];
+  return showPromises(ours.report, lengths(ours, loop, scale));
 }
 
-/** How far a result has moved from the file, measured once. */
-function movedBy({ model, report, classic }: Result, { model: file, opened }: Source): number | null {
-  // Halves of quads that were joined again are counted otherwise.
-  if ((classic === "catmull-clark") !== opened.polygons) return null;
-  const known = moves.get(model);
-  const moved = known === undefined ? distanceFrom(file, model, report.levels.length) : known;
-  moves.set(model, moved);
-  return moved;
+/** Measure how far a result is from its file, and show it. */
+async function measure({ model }: Result, { model: file }: Source): Promise<void> {
+  measurement.abort();
+  const { signal } = (measurement = new AbortController());
+  try {
+    if (!apart.has(model)) apart.set(model, await closeness(file, model, signal));
+    if (certified?.[0].model === model) certify(...certified);
+  } catch (error) {
+    if (!isAbort(error)) throw error;
+  }
 }
 
-function lengths(ours: Result, source: Source, loop: Result | null, { size, unit }: Scale): Lengths {
+function lengths(ours: Result, loop: Result | null, { size, unit }: Scale): Lengths {
   const { model, report } = ours;
   const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
   const measured = loop && distances(model, loop.model);
   return {
     proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0),
-    moved: movedBy(ours, source),
+    apart: apart.get(model),
     measured: measured && measured.max,
     rounding: rounding(model),
     size,

@@ -10,7 +10,7 @@ import type { Result } from "./result";
 import { isTheFiles, Session } from "./session";
 import { DEFAULTS, fromHash, toHash, type Asked, type Settings } from "./settings";
 import type { Again } from "./tasks";
-import { debounced, element } from "./ui/dom";
+import { debounced, element, input } from "./ui/dom";
 import { bindDownloads, offerFormatOf } from "./ui/downloads";
 import { bindFiles } from "./ui/file-input";
 import { FileList } from "./ui/file-list";
@@ -29,8 +29,6 @@ let choices = 0;
 let awaiting: Result | null = null;
 /** The example that the page shows of itself. */
 let example: Upload | null = null;
-/** The file whose settings were changed last. */
-let tuned = "";
 
 const stage = new Stage(() => void fetchValues(), remember);
 
@@ -47,10 +45,10 @@ const session = new Session({
     element("advice").hidden = true;
     form.rigged = source.model.meshes.some((mesh) => "isSkinnedMesh" in mesh);
     form.fit(opened.split);
-    sayKept();
     fileList.show(upload);
     offerFormatOf(upload);
     stage.open(source);
+    remember();
     if (opened.missing.length) addNotice(`${upload.name} names what is not among the files: ${listed(opened.missing)}.`);
   },
   refined: (ours) => {
@@ -99,11 +97,12 @@ const session = new Session({
 
 const given = fromHash(location.hash);
 const changed = debounced(300, () => {
-  tune();
+  remember();
   clear();
   void session.again(form.asked);
 });
 const form = new SettingsForm(given.settings, changed);
+pinFromLink(given.settings);
 stage.view = given.view;
 const fileList = new FileList(takeOne);
 
@@ -113,6 +112,9 @@ async function prepare(upload: Upload, { split }: Opened, signal: AbortSignal): 
   await offered;
   signal.throwIfAborted();
   const before = form.asked;
+  // What was set for another file stays with it, unless it is pinned.
+  const isOther = session.source !== null && session.source.upload !== upload;
+  if (isOther && !input("pin").checked) form.want(DEFAULTS);
   form.fit(split);
   const { refused, asked } = form;
   if (!refused) return asked;
@@ -178,22 +180,9 @@ function clear(): void {
 function restore(wanted: Settings): void {
   changed.cancel();
   form.want(wanted);
-  tune();
+  remember();
   clear();
   void session.again(form.asked);
-}
-
-/** Note for which file the settings were chosen. */
-function tune(): void {
-  tuned = session.source?.upload.name ?? "";
-  sayKept();
-  remember();
-}
-
-/** Say where settings come from that are not the defaults. */
-function sayKept(): void {
-  const name = session.source?.upload.name;
-  element("kept-text").textContent = tuned && tuned !== name ? `Settings kept from ${tuned}` : "Settings changed";
 }
 
 /** Fetch the values at vertices, which a plain result does not hold. */
@@ -218,6 +207,11 @@ function adopt(ours: Result, full: Model): void {
   });
   ours.full = true;
   stage.arrange();
+}
+
+/** Settings that a link names are for any file. */
+function pinFromLink(settings: Settings): void {
+  input("pin").checked = toHash(settings, {}) !== "";
 }
 
 /** Put what the user wants into the address: not what one file makes of it. */
@@ -267,7 +261,10 @@ bindPanel({
     session.cancel();
     if (!element("notice").hidden) element("again").focus();
   },
-  reset: () => restore({ ...DEFAULTS }),
+  reset: () => {
+    input("pin").checked = false;
+    restore({ ...DEFAULTS });
+  },
   retry: () => {
     offered = start();
     retry();
@@ -283,6 +280,7 @@ keepFocus();
 addEventListener("hashchange", () => {
   const { settings, view } = fromHash(location.hash);
   stage.view = view;
+  pinFromLink(settings);
   restore(settings);
 });
 let offered = start();

@@ -88,7 +88,7 @@ export class Session {
   async fetch(ours: Result, writing: Writing, again: Again): Promise<ArrayBuffer | null> {
     let bytes: ArrayBuffer | null = null;
     await this.run({ kind: "download", upload: null, again }, async (signal) => {
-      ({ bytes } = await this.answer(ours, query(ours.asked.settings, ours.classic, writing), signal));
+      ({ bytes } = await this.answer(ours, query(ours.asked.settings, ours.classic, writing), signal, "for the download"));
     });
     return bytes;
   }
@@ -97,7 +97,8 @@ export class Session {
   async full(ours: Result, again: Again): Promise<Model | null> {
     let model: Model | null = null;
     await this.run({ kind: "values", upload: null, again }, async (signal) => {
-      const { bytes } = await this.answer(ours, query(ours.asked.settings, ours.classic, { diagnostics: "full" }), signal);
+      const asked = query(ours.asked.settings, ours.classic, { diagnostics: "full" });
+      const { bytes } = await this.answer(ours, asked, signal, "for the heat map");
       const { scene } = await shownIn("The heat map", () => parseGltf(bytes));
       model = modelOf(scene, []);
     });

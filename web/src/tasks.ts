@@ -43,6 +43,7 @@ export interface Shown {
 export const EMPTY: Shown = { source: null, order: null, ours: null, loop: null };
 
 export interface Listener {
+  /** `what` the work is for; empty where its result takes the place of the one that is shown. */
   progress(progress: Progress, what: string): void;
   /** A file takes the stage. */
   opened(source: Source): void;

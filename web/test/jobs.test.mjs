@@ -177,7 +177,7 @@ describe("jobs of the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     const refusal = { title: "A parameter is out of range", detail: "No.", parameter: "budget", status: 422 };
     await page.route(/\/subdivide\?/, (route) => route.fulfill({ status: 422, json: refusal }));
-    await page.click(".more summary");
+    await page.click("#research summary");
     await page.fill("#strength", "150");
     await page.locator("#problem-pointer", { hasText: "budget" }).waitFor();
     assert.equal(await page.inputValue("#strength"), "100");

@@ -258,7 +258,7 @@ def refine_alone(
         copies=control.copies,
         report=None if made is None else made.reports[0],
         changes=changes,
-        bends=NO_BENDS if made is None else count_bends(control.surface, creases)[0],
+        bends=NO_BENDS if made is None else count_bends(control.surface, creases, options)[0],
         parents=None if made is None or made.parents is None else _of_rows(made.parents, control),
     )
 

@@ -70,7 +70,7 @@ class MeshOutcome:
         copies: number of faces with the vertices of an earlier face.
         report: the operator's; None if no face was left.
         changes: what was joined, dropped or cut.
-        bends: bent edges, and the sharp ones among them.
+        bends: steep edges, and those in doubt.
         parents: what each refined vertex is made of, if asked for: rows of the primitives, one
             primitive after the other.
     """
@@ -184,7 +184,7 @@ def refine_together(
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
         pieces = refined_primitives(control, made, grid, blend, course)
         part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
-        bends = count_bends(control.mesh, creases, len(meshes), part_of_face)
+        bends = count_bends(control.mesh, creases, options, len(meshes), part_of_face)
         cut = _divided(control, parts, made, pieces, meshes, numbers, options)
         return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 

@@ -112,6 +112,15 @@ def test_a_served_file_is_the_default_and_one_that_does_not_load_is_not_listed(
     assert "missing" in catalogue_of(missing).names
 
 
+def test_a_model_that_leaves_polygons_to_the_classic_rule_says_so_when_it_is_loaded(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    catalogue_of(serving(None))
+    assert "companion" not in caplog.text
+    catalogue_of(serving(served_file(tmp_path / "mine.onnx")))
+    assert "model mine has no companion for polygons" in caplog.text
+
+
 def test_every_model_runs_on_the_providers_that_are_set() -> None:
     models = Models()
     models.hold(None, ("CPUExecutionProvider",))

@@ -9,7 +9,7 @@ export function addFan<T>(triangles: T[], polygon: T[], vertexOf: (corner: T) =>
 }
 
 /** Whether the triangle that begins at a corner goes on with the polygon of the one before it. */
-export function goesOn(corners: ArrayLike<number>, begin: number): boolean {
+function goesOn(corners: ArrayLike<number>, begin: number): boolean {
   return begin > 0 && corners[begin] === corners[begin - 3] && corners[begin + 1] === corners[begin - 1];
 }
 

@@ -3,12 +3,9 @@
  * order; their vertices may differ, since those at a crease are one for each of its sides where normals break there.
  */
 
-import { Box3, Matrix4, Triangle, Vector3, type BufferAttribute, type BufferGeometry, type Mesh, type SkinnedMesh } from "three";
-import { goesOn } from "../files/polygons";
+import { Box3, Matrix4, Vector3, type BufferAttribute, type Mesh, type SkinnedMesh } from "three";
 import type { Model } from "../view/model";
 import { corners } from "./weld";
-
-type Position = ReturnType<BufferGeometry["getAttribute"]>;
 
 export interface Field {
   /** One value a vertex, by mesh. */
@@ -42,58 +39,6 @@ export function distances(ours: Model, loop: Model): Field | null {
     values.push(lengths);
   }
   return { values, max };
-}
-
-/**
- * The largest distance of a refined vertex from the faces of the file that it was made in, in the scene's units;
- * null where faces have no counterparts: those of one face follow each other, in the order of the file.
- */
-export function distanceFrom(file: Model, refined: Model, levels: number): number | null {
-  if (file.meshes.length !== refined.meshes.length) return null;
-  let max = 0;
-  const face = new Triangle();
-  const [point, nearest] = [new Vector3(), new Vector3()];
-  for (const [number, mesh] of refined.meshes.entries()) {
-    const { geometry, userData } = file.meshes[number]!;
-    const [from, to] = [geometry.getAttribute("position"), mesh.geometry.getAttribute("position")];
-    const [of, by] = [corners(geometry), corners(mesh.geometry)];
-    const faces = facesOf(of, from, userData.polygons === true);
-    // Catmull–Clark makes a quad, two triangles, at each corner of a polygon.
-    const share = (triangles: number[]): number => (userData.polygons ? (triangles.length + 2) / 2 : 1) * 4 ** levels;
-    if (faces.reduce((sum, triangles) => sum + share(triangles), 0) * 3 !== by.length) return null;
-    const toScene = placement(mesh);
-    const lengths = new Float32Array(to.count).fill(Infinity);
-    const last = new Int32Array(to.count).fill(-1);
-    let begin = 0;
-    for (const [index, triangles] of faces.entries()) {
-      const end = begin + 3 * share(triangles);
-      for (; begin < end; begin++) {
-        const vertex = by[begin]!;
-        if (last[vertex] === index) continue;
-        last[vertex] = index;
-        point.fromBufferAttribute(to, vertex).applyMatrix4(toScene);
-        for (const corner of triangles) {
-          for (const [end, at] of [face.a, face.b, face.c].entries()) {
-            at.fromBufferAttribute(from, of[corner + end]!).applyMatrix4(toScene);
-          }
-          lengths[vertex] = Math.min(lengths[vertex]!, face.closestPointToPoint(point, nearest).distanceTo(point));
-        }
-      }
-    }
-    max = lengths.reduce((a, b) => (b < Infinity ? Math.max(a, b) : a), max);
-  }
-  return max;
-}
-
-/** The faces that are refined, each as where the corners of its triangles begin: empty ones are dropped. */
-function facesOf(of: ArrayLike<number>, at: Position, polygons: boolean): number[][] {
-  const faces: number[][] = [];
-  const place = (corner: number): string => [at.getX(of[corner]!), at.getY(of[corner]!), at.getZ(of[corner]!)].join();
-  for (let begin = 0; begin + 2 < of.length; begin += 3) {
-    if (polygons && goesOn(of, begin)) faces.at(-1)!.push(begin);
-    else if (polygons || new Set([place(begin), place(begin + 1), place(begin + 2)]).size === 3) faces.push([begin]);
-  }
-  return faces;
 }
 
 /** By how much distances between refined vertices may be wrong, in the scene's units: a file has its positions in float32. */

@@ -1,5 +1,6 @@
-/** Three promises that a report proves of a result, in plain words, and the mathematics behind them. */
+/** How close a result stays, in plain words, and the mathematics behind them. */
 
+import type { Closeness } from "../measure/closeness";
 import { counted, length, percent, type Unit } from "./format";
 import { isLearned, largestRatio, sharpEdges, type Report } from "./report";
 
@@ -15,8 +16,8 @@ export interface Promised {
 export interface Lengths {
   /** The largest distance of the limit surface from the classic rule's, as the report proves it. */
   proved: number;
-  /** The largest distance of a refined vertex from the user's own model; null where it cannot be told. */
-  moved: number | null;
+  /** How far the result and the user's own model are apart; null where it cannot be told; undefined until it is known. */
+  apart: Closeness | null | undefined;
   /** The largest distance between a vertex and its counterpart by the classic rule; null until that side is there. */
   measured: number | null;
   /** The possible error of `measured`. */
@@ -41,8 +42,11 @@ export function promises(report: Report, lengths: Lengths): Promised[] {
   ];
 }
 
-function movedBy({ moved, size }: Lengths): string {
-  return moved === null ? "" : `No point is farther from your model than ${percent(Math.max(moved / size, 1e-4))} of its size.`;
+function distanceOf({ apart, size }: Lengths): string {
+  if (apart === undefined) return "Measuring how far it is from your model…";
+  if (!apart) return "How close is proved: see Research.";
+  const { most, mean } = apart;
+  return `At most ${percent(most / size)} of the model’s size away from your file, ${percent(mean / size)} on average: measured from each surface to the other.`;
 }
 
 function classic(lengths: Lengths): Promised {
@@ -51,7 +55,7 @@ function classic(lengths: Lengths): Promised {
   return {
     holds: true,
     title: "Nothing learned",
-    text: `This is ${rule}’s rule alone. ${movedBy(lengths)}`.trim(),
+    text: `This is ${rule}’s rule alone. ${distanceOf(lengths)}`,
     mathematics: `Distance to ${rule}’s limit surface with the same creases: ${length(0, unit)}.${kept}`,
   };
 }
@@ -62,14 +66,14 @@ function closeness(report: Report, lengths: Lengths): Promised {
   const most = proved * 1.001 + 1e-6 * size;
   // Without this remark the two numbers would seem to disagree.
   const rounded = measured !== null && measured > most ? `, to ${length(rounding, unit)} by the file’s own rounding` : "";
-  const apart = measured === null ? "" : ` Measured between the refined vertices: ${length(measured, unit)}${rounded}.`;
+  const between = measured === null ? "" : ` Measured between the refined vertices: ${length(measured, unit)}${rounded}.`;
   const sharp = report.levels.some(sharpEdges) ? ", which rounds sharp edges too" : "";
   return {
     holds: (measured === null || measured <= most + rounding) && used <= 1 + 1e-12,
     title: "Stays close",
-    text: movedBy(lengths) || "How close is proved: see the mathematics.",
+    text: distanceOf(lengths),
     mathematics:
-      `Every point of the limit surface is within ${length(proved, unit)} of ${rule}’s${sharp}.${apart} ` +
+      `Every point of the limit surface is within ${length(proved, unit)} of ${rule}’s${sharp}.${between} ` +
       `Each vertex may leave its place by ${rule}’s rule by C h² / R at most, whatever the model says; ` +
       `at most ${percent(Math.min(used, 1))} of that was used.`,
   };
@@ -95,8 +99,8 @@ function flatness(report: Report, { rule }: Lengths): Promised {
   const active = Math.max(...report.levels.map((level) => level.gate.active));
   return {
     holds: true,
-    title: "Flat stays flat",
-    text: "A face whose neighbours lie in its plane stays in it. Beside an edge it may bulge a little.",
+    title: "Keeps planes",
+    text: "Where a face and its neighbours lie in one plane, so does the result.",
     mathematics:
       `By construction: where neighbouring faces are coplanar the gate γ of each correction is 0, and the vertices are ${rule}’s; ` +
       "boundaries and creases may bend within their plane. " +

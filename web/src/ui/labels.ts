@@ -9,6 +9,8 @@ import { element, make } from "./dom";
 
 interface Label {
   title: string;
+  /** What there is room for on a wide screen alone, and what is always shown. */
+  more?: string;
   text: string;
 }
 
@@ -19,6 +21,7 @@ export function showLabels(source: Source | null, ours: Result | null, loop: Res
     element(`label-${side}`).hidden = !label;
     element(`label-${side}`).replaceChildren(
       make("strong", { textContent: label?.title ?? "" }),
+      make("span", { className: "wide-only", textContent: label?.more ?? "" }),
       make("span", { textContent: label?.text ?? "" }),
     );
   }
@@ -32,10 +35,13 @@ function labels(
 ): [Label | null, Label | null] {
   const of = ({ report }: Result): string => counted(report.totals.faces, "face");
   const rule = ({ report }: Result): string => (isClassic(report.base) ? "Classic" : nameOf(report.base));
-  const text = ours ? `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : rule(ours)} · ${of(ours)}` : "";
+  const refined = ours && {
+    title: "After",
+    more: `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : rule(ours)} · `,
+    text: of(ours),
+  };
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };
-  const after = ours && { title: "After", text };
-  if (layout === "overlay" || layout === "single") return [null, after ?? before];
-  if (loop && ours) return [{ title: `Classic (${nameOf(loop.classic)})`, text: of(loop) }, { title: "After", text }];
-  return [before, after];
+  if (layout === "overlay" || layout === "single") return [null, refined ?? before];
+  if (loop && ours) return [{ title: `Classic (${nameOf(loop.classic)})`, text: of(loop) }, refined];
+  return [before, refined];
 }

@@ -39,29 +39,26 @@ export function showPromises(report: Report, lengths: Lengths): string {
   return promised.map(({ title, text }) => `${title}: ${text}`).join(" ");
 }
 
-/** What a hint asks for, as the service spells it: the button's words, and the settings. */
+/** An option as the service spells it, the page's name for it, and the settings that it stands for. */
 const DEEDS: [RegExp, string, (value: string) => Partial<Settings>][] = [
-  [/use crease=angle:(\d+), which keeps ([\d,]+), for a rounder shape/, "Make it rounder: keep $2 sharp edges", (angle) => ({ crease: "angle", angle: Number(angle) })],
-  [/use crease=off to round all of them/, "Round all edges", () => ({ crease: "off" })],
-  [/use normals=smooth/, "Smooth shading", () => ({ normals: "smooth" })],
-  [/use weld_tolerance=[\d.]+( to join vertices that nearly coincide)?/, "Close small gaps", () => ({ weld: true })],
+  [/crease=off/, "Round throughout", () => ({ crease: "off" })],
+  [/crease=angle:(\d+)/, "Crisp edges", (angle) => ({ crease: "angle", angle: Number(angle) })],
+  [/normals=smooth/, "Smooth shading", () => ({ normals: "smooth" })],
+  [/weld_tolerance=[\d.]+/, "Close small gaps", () => ({ weld: true })],
 ];
 
-/** Show the first thing that the user should know or do, and a button that does it. */
+/** Show the first thing that the user should know or do, and buttons that do it. */
 export function showAdvice(report: Report, set: (settings: Partial<Settings>) => void): void {
-  const asked = changesOf(report).filter(({ hint }) => DEEDS.some(([use]) => use.test(hint)));
-  const [text] = [...(report.advice ?? []), ...asked.map(({ text }) => text)];
+  const asked = changesOf(report).filter(({ hint }) => DEEDS.some(([option]) => option.test(hint)));
+  const [text = ""] = [...(report.advice ?? []), ...asked.map(({ text }) => text)];
   element("advice").hidden = !text;
-  if (!text) return;
-  const deed = DEEDS.find(([use]) => use.test(text));
-  const [use, label, settings] = deed ?? [/$/, "", () => ({})];
-  const found = use.exec(text)!;
-  const said = [text.slice(0, found.index), text.slice(found.index + found[0].length)];
-  element("advice-text").textContent = said.map((part) => part.replace(/^[\s,:;]+|[\s,:;]+$/g, "")).filter(Boolean).join("; ");
-  const button = element<HTMLButtonElement>("advice-do");
-  button.hidden = !deed;
-  button.textContent = found[0].replace(use, label);
-  button.onclick = () => set(settings(found[1] ?? ""));
+  element("advice-text").textContent = inOurWords(text);
+  element("advice-deeds").replaceChildren(
+    ...DEEDS.flatMap(([option, label, settings]) => {
+      const found = option.exec(text);
+      return found ? [make("button", { textContent: label, onclick: () => set(settings(found[1] ?? "")) })] : [];
+    }),
+  );
 }
 
 export interface Before {
@@ -140,7 +137,7 @@ export function showChanges(report: Report): void {
 
 /** Name settings as the page does. */
 function inOurWords(text: string): string {
-  return DEEDS.reduce((said, [use, label]) => said.replace(use, `choose “${label}”`), text);
+  return DEEDS.reduce((said, [option, label]) => said.replace(option, `“${label}”`), text);
 }
 
 /** The name of the mesh that a pointer leads to; "" without one. */

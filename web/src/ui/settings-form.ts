@@ -29,11 +29,14 @@ export class SettingsForm {
     this.settings = { ...wanted };
     const form = element<HTMLFormElement>("settings");
     form.addEventListener("submit", (event) => event.preventDefault());
-    form.addEventListener("input", ({ target }) => {
+    const read = ({ target }: Event): void => {
+      if (target === input("pin")) return;
       // The browser says what is wrong with a number, in the user's language.
       if (target instanceof HTMLInputElement && !target.reportValidity()) return;
       this.read(target);
-    });
+    };
+    form.addEventListener("input", read);
+    input("strength").addEventListener("input", read);
     this.write();
   }
 

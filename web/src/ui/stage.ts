@@ -38,6 +38,7 @@ export class Stage {
   private extent: Extent = { box: new Box3(), points: new Float32Array() };
   /** Where a link puts the camera, until there is a file to look at. */
   private awaited: string | null = null;
+  private hasOpened = false;
 
   /** `wantFull` is called for values that the result does not hold yet. */
   constructor(
@@ -100,6 +101,13 @@ export class Stage {
   }
 
   open(source: Source): void {
+    // A heat map explains one result; that of a link is for the first file.
+    if (this.hasOpened && this.heat) {
+      select("look").value = this.surface;
+      this.heat = null;
+      this.changed();
+    }
+    this.hasOpened = true;
     this.shown = { source, ours: null, loop: null };
     this.playback.clear();
     this.adopt(source.model);
@@ -196,6 +204,7 @@ export class Stage {
     this.viewer.layout = this.layout;
     this.viewer.sides = { left, right };
     this.viewer.over = this.overlaid;
+    this.viewer.caster = this.overlaid ? right : (source?.model ?? null);
     this.viewer.standsOnGround = this.surface === "material" || this.surface === "clay";
     for (const model of this.models()) {
       const look = this.lookOf(model);
@@ -238,6 +247,7 @@ export class Stage {
     element("view").style.setProperty("--tools", `${Math.max(above("tools"), 0)}px`);
     if (!this.viewer) return;
     this.viewer.rig.covered = Math.max(above("tools"), above("timeline"), 0);
+    if (!this.viewer.rig.chosen && this.shown.source) this.viewer.frame(this.extent, false);
     this.viewer.invalidate();
   }
 

@@ -34,9 +34,10 @@ function stepOf({ step, share, place, stage }: Progress): string {
   }
 }
 
-/** Show progress; `what` names one of several jobs. */
+/** Show progress; `what` names a job beside the result that is shown, which else is out of date. */
 export function showProgress(progress: Progress, what = ""): void {
   element("work").hidden = false;
+  document.body.classList.toggle("stale", !what);
   const text = `${sentence(progress)}${what ? ` · ${what}` : ""}`;
   element("work-text").textContent = text;
   // A screen reader is to hear each step once, and no percents.
@@ -50,6 +51,7 @@ export function showProgress(progress: Progress, what = ""): void {
 
 export function hideProgress(): void {
   element("work").hidden = true;
+  document.body.classList.remove("stale");
 }
 
 /** Show a notice; `again` offers the refinement that was cancelled. */
@@ -88,7 +90,7 @@ export function showProblem(error: unknown, file = ""): void {
   const problem = problemFrom(error);
   if (!problem) console.error(error);
   element("problem-title").textContent = problem?.title ?? "The page failed";
-  element("problem-detail").textContent = problem?.message ?? String(error);
+  element("problem-detail").textContent = asSentence(problem?.message ?? String(error));
   const pointer = problem?.pointer ?? problem?.parameter ?? "";
   const isNamed = !file || problem?.message.includes(file);
   const place = [isNamed ? "" : `in ${file}`, pointer && `at ${pointer}`].filter(Boolean).join(", ");
@@ -98,9 +100,12 @@ export function showProblem(error: unknown, file = ""): void {
   // The service is busy, slow or gone: the same may work in a moment.
   element("problem-again").hidden = !problem || (problem.status < 500 && ![0, 408, 429].includes(problem.status));
   element("problem").hidden = false;
-  document.body.classList.remove("folded");
   element("problem").scrollIntoView({ block: "nearest" });
   if (problem?.status === 401) input("key").focus();
+}
+
+function asSentence(text: string): string {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? "" : "."}`;
 }
 
 export function hideProblem(): void {

@@ -35,6 +35,8 @@ export class Viewer {
   wipe = 0.5;
   /** Whether models stand on a ground, and cast a shadow there. */
   standsOnGround = false;
+  /** What casts the shadow, on both sides. */
+  caster: Model | null = null;
   /** Called once a frame with the seconds since the last; returns whether it wants another. */
   onFrame: (seconds: number) => boolean = () => false;
 
@@ -130,15 +132,17 @@ export class Viewer {
       this.renderer.setSize(width, height, false);
     }
     const { left, right } = this.sides;
+    // Software draws it once nothing moves, and until then as it was.
+    if (finely && this.standsOnGround) this.castShadow();
     const split = Math.round(this.wipe * width);
     if (!left || !right || this.layout === "overlay" || this.layout === "single") {
-      this.view(right ?? left, finely, 0, width, 0, width);
+      this.view(right ?? left, 0, width, 0, width);
     } else if (this.layout === "side") {
-      this.view(left, finely, 0, width / 2, 0, width / 2);
-      this.view(right, finely, width / 2, width / 2, width / 2, width / 2);
+      this.view(left, 0, width / 2, 0, width / 2);
+      this.view(right, width / 2, width / 2, width / 2, width / 2);
     } else {
-      this.view(left, finely, 0, width, 0, split);
-      this.view(right, finely, 0, width, split, width - split);
+      this.view(left, 0, width, 0, split);
+      this.view(right, 0, width, split, width - split);
     }
     this.tell();
   }
@@ -151,20 +155,13 @@ export class Viewer {
   }
 
   /** Draw one model over the columns from `x`, and of those the ones from `from`. */
-  private view(model: Model | null, finely: boolean, x: number, width: number, from: number, columns: number): void {
+  private view(model: Model | null, x: number, width: number, from: number, columns: number): void {
     if (columns <= 0) return;
     const { height } = this.size();
     const { renderer, scene, shadow } = this;
-    for (const object of scene.children) {
-      if (object === this.rig.camera || "isLight" in object) continue;
-      object.visible = object === model?.root || object === this.over?.root;
-    }
+    this.showOnly(model);
     renderer.setClearColor(this.paper);
-    if (model && this.standsOnGround) {
-      // Software draws it once nothing moves, and until then as it was.
-      if (finely) shadow.render(renderer, scene);
-      shadow.ground.visible = true;
-    }
+    shadow.ground.visible = model !== null && this.standsOnGround;
     renderer.setScissorTest(true);
     renderer.setViewport(x, 0, width, height);
     renderer.setScissor(from, 0, columns, height);
@@ -172,6 +169,18 @@ export class Viewer {
     if (!model) return;
     this.rig.project(width, height);
     renderer.render(scene, this.rig.camera);
+  }
+
+  private castShadow(): void {
+    this.showOnly(this.caster);
+    if (this.caster) this.shadow.render(this.renderer, this.scene);
+  }
+
+  private showOnly(model: Model | null): void {
+    for (const object of this.scene.children) {
+      if (object === this.rig.camera || "isLight" in object) continue;
+      object.visible = object === model?.root || object === this.over?.root;
+    }
   }
 
   private centreAt(event: MouseEvent): void {

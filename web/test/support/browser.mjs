@@ -28,7 +28,7 @@ export async function open(browser, address, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1000, height: 700 }, ...settings });
   const page = await context.newPage();
   // A page that hangs ends some time; a machine that is busy is no fault.
-  page.setDefaultTimeout(600_000);
+  page.setDefaultTimeout(Number(process.env.PATIENCE_MS ?? 600_000));
   const faults = [];
   const origin = new URL(address).origin;
   page.on("request", (request) => {

@@ -56,8 +56,9 @@ def test_first_bytes_say_which_of_both_a_file_is():
         assert read_container(text, kind).text == text
     # What is neither is looked at as its name says.
     assert read_container(b"[]", "gltf").text == b"[]"
-    with pytest.raises(UnreadableError, match="magic"):
-        read_container(b"a text that is no GLB", "glb")
+    for start, said in ((b"a text", "'a text t'"), (b"PK\x03\x04", "50 4b 03 04")):
+        with pytest.raises(UnreadableError, match=f"not a glTF file: it begins with {said}"):
+            read_container(start + b" that is no GLB", "glb")
 
 
 WHOLE = files.pack(b"{}", b"1234")
