@@ -165,7 +165,9 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         # An OBJ names values corner by corner, but for colours.
         and ((layer.rows >= 0).all() or (kind == "obj" and name != COLOUR))
     }
-    lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
+    for name in mesh.layers.keys() - layers.keys():
+        partly = form.layers is None or name in form.layers
+        lost[shown(name) + " that not all corners have" * partly] = 1
     if kind == "obj" and COLOUR in layers:
         colours = as_fractions(layers[COLOUR].values)
         if (colours[:, 3:] < 1).any():

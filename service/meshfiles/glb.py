@@ -28,7 +28,7 @@ from ..report import Change
 from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of
-from .parts import Part, parts_of
+from .parts import Part, kinds_of, parts_of
 from .triangulate import triangulated
 
 _SHAPES: tuple[Literal["SCALAR", "VEC2", "VEC3", "VEC4"], ...] = ("SCALAR", "VEC2", "VEC3", "VEC4")
@@ -199,14 +199,11 @@ def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
 
 
 def _as_triangles(mesh: MeshFile) -> MeshFile:
-    """Return quads as triangles, those of a material together, as FB_ngon_encoding asks for.
+    """Return quads as triangles, those of a primitive together, as FB_ngon_encoding asks for.
 
     Triangles of one quad begin with one vertex, and those of the next with another.
     """
-    materials = mesh.labels.get(MATERIAL)
-    order = np.arange(len(mesh.sizes))
-    if materials is not None:
-        order = np.argsort(materials.of_face, kind="stable")
+    order = np.argsort(kinds_of(mesh), kind="stable")
     begin = _beginnings(mesh.corners.reshape(-1, 4)[order])
     places = (4 * order[:, None] + FANS[begin]).reshape(-1)
     return mesh.cut(places.reshape(-1, 3), np.repeat(order, 2))

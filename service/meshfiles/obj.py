@@ -46,6 +46,7 @@ _DROPPED = {
 (_SLASH,) = b"/"
 # Colours as ZBrush writes them.
 _PAINT = re.compile(rb"(?m)^#MRGB[ \t]+([0-9A-Fa-f]+)")
+_CONTINUED = re.compile(rb"(\\)([ \t]+)(?=\n)")
 _REFERENCES = re.compile(rb"[+-]?\d+(?:/(?:[+-]?\d+)?){0,2}")
 
 
@@ -56,6 +57,9 @@ def read_obj(data: bytes) -> MeshFile:
         UnreadableError: a position or a face cannot be read, or names a vertex that there is not.
     """
     data = plain_text(data)
+    if b"\\" in data:
+        # Blanks behind a backslash, as editors leave them.
+        data = _CONTINUED.sub(rb"\2\1", data)
     text = cut_text(data, "OBJ", continued=True)
     is_v, is_vt, is_vn = (text.keyword(word) for word in (b"v", b"vt", b"vn"))
     is_face = text.keyword(b"f") | text.keyword(b"fo")
@@ -73,7 +77,7 @@ def read_obj(data: bytes) -> MeshFile:
         why = "they count from 1" if name == 0 else f"there are {there}"
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
-    layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
+    layers = _layers(text, (is_vt, vt), (is_vn, vn), sizes, lost)
     painted = b"".join(_PAINT.findall(data)) if b"#MRGB" in data else b""
     if len(painted) == 8 * len(vertices):
         # Of each vertex a mask, and three bytes of its colour.
@@ -159,9 +163,13 @@ def _layers(
     text: Text,
     uv: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
     normals: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
+    sizes: Int[np.ndarray, " F"],
     lost: Counter[str],
 ) -> dict[str, Layer]:
-    """Read what corners name beside positions; what cannot be read is dropped."""
+    """Read what corners name beside positions; what cannot be read is dropped.
+
+    A face has values at all of its corners or at none.
+    """
     layers: dict[str, Layer] = {}
     kinds = {
         UV: (*uv, 2, 1, "texture coordinates"),
@@ -178,6 +186,10 @@ def _layers(
             why = " that cannot be read" if named.any() else " that no face names"
             lost[shown + why] = count
             continue
+        missing = np.bincount(np.repeat(np.arange(len(sizes)), sizes)[~named], minlength=len(sizes))
+        partly = (missing > 0) & (missing < sizes)
+        lost[f"{shown} of faces of which not all corners have some"] += int(partly.sum())
+        named &= np.repeat(missing == 0, sizes)
         layers[name] = Layer(values, np.where(named, rows, NONE))
     return layers
 

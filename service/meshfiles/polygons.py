@@ -285,7 +285,10 @@ def _refined(
     corners = corners.reshape(-1)
     if bare.any():
         counts = 4 * np.diff(mesh.offsets) * 4 ** (options.levels - 1)
-        corners = np.where(np.repeat(bare, counts), NONE, corners)
+        bare = np.repeat(bare, counts)
+        used, inside = np.unique(corners[~bare], return_inverse=True)
+        column, corners = column[used], np.full(len(corners), NONE)
+        corners[~bare] = inside
     return Layer(column, corners)
 
 
