@@ -185,9 +185,12 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     lost |= {
         f"{name}s": len(mesh.labels[name].names) for name in mesh.labels.keys() - labels.keys()
     }
-    changes = [Change("", what + why, count) for what, count in sorted(lost.items())]
     libraries = mesh.libraries if MATERIAL in form.labels else ()
-    mesh = replace(mesh, layers=layers, face_values=values, labels=labels, libraries=libraries)
+    textures = mesh.textures if kind == "ply" else ()
+    lost["names of textures"] = len(mesh.textures) - len(textures)
+    changes = [Change("", what + why, count) for what, count in sorted(lost.items()) if count]
+    held = replace(mesh, layers=layers, face_values=values, labels=labels)
+    mesh = replace(held, libraries=libraries, textures=textures)
     names = form.vertex_layers
     mesh = with_vertex_layers(mesh, [*layers] if names is None else [*names])
     if not (form.double or (kind == "ply" and mesh.double)):

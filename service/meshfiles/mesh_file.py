@@ -56,7 +56,9 @@ class MeshFile:
         layers: values at corners by name; texture coordinates count v upwards.
         face_values: (F, K) values of faces, by name.
         labels: names of faces, by what they name.
-        libraries: files that define the materials.
+        libraries: files that define the materials, as the file spells them.
+        textures: images that a PLY names, likewise.
+        encoding: of the names above, and of those in labels.
         double: whether a format that has both is to store positions as doubles.
         changes: what the reader dropped or mended.
         parents: of a refined mesh, the vertices of the file that each vertex is made of.
@@ -69,6 +71,8 @@ class MeshFile:
     face_values: dict[str, Shaped[np.ndarray, "F K"]] = field(default_factory=dict)
     labels: dict[str, Labels] = field(default_factory=dict)
     libraries: tuple[str, ...] = ()
+    textures: tuple[str, ...] = ()
+    encoding: str = "utf-8"
     double: bool = False
     changes: tuple[Change, ...] = ()
     parents: SubdivisionMatrix | None = None

@@ -31,7 +31,7 @@ from .mesh_file import (
     dropped,
     offsets_of,
 )
-from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
+from .text import BLOCK, NUMBER, Text, cut_text, encoding_of, named, parsed, plain_text, rows_text
 
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
 _LIBRARY = b"mtllib"
@@ -86,7 +86,8 @@ def read_obj(data: bytes) -> MeshFile:
         lost["colours that not all vertices have"] += 1
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)
-    labels, libraries = _statements(text, data, ~(is_v | is_vt | is_vn | is_face), line, lost)
+    others = ~(is_v | is_vt | is_vn | is_face)
+    labels, libraries, encoding = _statements(text, data, others, line, lost)
     return MeshFile(
         vertices,
         offsets_of(sizes),
@@ -94,6 +95,7 @@ def read_obj(data: bytes) -> MeshFile:
         layers,
         labels=labels,
         libraries=libraries,
+        encoding=encoding,
         changes=dropped(lost),
     )
 
@@ -223,38 +225,39 @@ def _statements(
     others: Bool[np.ndarray, " L"],
     face_lines: Int[np.ndarray, " F"],
     lost: Counter[str],
-) -> tuple[dict[str, Labels], tuple[str, ...]]:
-    """Return the names that statements give to the faces below them, and the libraries.
+) -> tuple[dict[str, Labels], tuple[str, ...], str]:
+    """Return the names that statements give to the faces below them, the libraries, the encoding.
 
     `data` has the comments that are blank in the text. Other statements are counted as lost.
     """
     known = {word: kind for kind, word in STATEMENTS.items()}
-    given: dict[str, list[tuple[int, str]]] = {kind: [] for kind in known.values()}
-    libraries: list[str] = []
+    given: dict[str, list[tuple[int, bytes]]] = {kind: [] for kind in known.values()}
+    libraries: dict[bytes, None] = {}
     for line in np.flatnonzero(others & (text.counts > 0)).tolist():
         first = text.first[line]
         word = text.word(first).lower()
         if word in known or word == _LIBRARY:
             end = text.starts[line + 1] if line + 1 < len(text.starts) else len(data)
-            name = name_of(data[text.ends[first] : end].replace(b"\\\n", b" "))
+            name = named(data[text.ends[first] : end].replace(b"\\\n", b" "))
             if word == _LIBRARY:
-                libraries.append(name)
+                libraries[name] = None
             else:
                 given[known[word]].append((line, name))
         elif word in _DROPPED:
             lost[_DROPPED[word]] += 1
         else:
             lost["other statements"] += 1
+    encoding = encoding_of(b"".join([*libraries, *(n for own in given.values() for _, n in own)]))
     labels: dict[str, Labels] = {}
     for kind, entries in given.items():
         if not entries or not len(face_lines):
             continue
-        numbers: dict[str, int] = {}
+        numbers: dict[bytes, int] = {}
         of_entry = [numbers.setdefault(name, len(numbers)) for _, name in entries]
         place = np.searchsorted([line for line, _ in entries], face_lines) - 1
         of_face = np.where(place >= 0, np.array(of_entry)[place], NONE)
-        labels[kind] = Labels(tuple(numbers), of_face)
-    return labels, tuple(dict.fromkeys(libraries))
+        labels[kind] = Labels(tuple(name.decode(encoding) for name in numbers), of_face)
+    return labels, tuple(name.decode(encoding) for name in libraries), encoding
 
 
 def write_obj(mesh: MeshFile) -> bytes:
@@ -280,7 +283,7 @@ def write_obj(mesh: MeshFile) -> bytes:
     if normals is not None:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
     pieces += _faces_text(mesh, uv, normals, first)
-    return "".join(pieces).encode()
+    return "".join(pieces).encode(mesh.encoding)
 
 
 def _faces_text(

@@ -30,7 +30,6 @@ from .mesh_file import (
     Layer,
     MeshFile,
     joined_layer,
-    of_triangles,
     shown,
 )
 from .triangulate import area_vectors
@@ -229,11 +228,13 @@ def joined(
         kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
     }
     return replace(
-        of_triangles(vertices, corners),
+        mesh,
+        vertices=vertices,
+        offsets=np.arange(0, corners.size + 1, 3),
+        corners=corners.reshape(-1).astype(np.int64),
         layers=layers,
         face_values={name: values[ranks] for name, values in mesh.face_values.items()},
         labels=labels,
-        libraries=mesh.libraries,
-        double=mesh.double,
+        changes=(),
         parents=None if parents is None else parents.take(used),
     )

@@ -221,15 +221,15 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
         layers |= {
             name: Layer(np.array(values)[:, None], corners) for name, values in scalars.items()
         }
-    return MeshFile(
-        made.mesh.vertices,
-        made.mesh.offsets,
-        corners,
-        layers,
-        {name: values[of_face] for name, values in mesh.face_values.items()},
-        {kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
-        mesh.libraries,
-        mesh.double,
+    return replace(
+        mesh,
+        vertices=made.mesh.vertices,
+        offsets=made.mesh.offsets,
+        corners=corners,
+        layers=layers,
+        face_values={name: values[of_face] for name, values in mesh.face_values.items()},
+        labels={kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
+        changes=(),
     )
 
 

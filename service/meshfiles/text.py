@@ -49,15 +49,26 @@ def plain_text(data: bytes) -> bytes:
 
 
 def name_of(text: bytes) -> str:
-    """Return a name without the comment behind it; those of old files are Latin-1.
+    """Return a name without the comment behind it; those of old files are Latin-1."""
+    name = named(text)
+    return name.decode(encoding_of(name))
+
+
+def named(text: bytes) -> bytes:
+    """Return a name without the comment behind it.
 
     A # within a word, or before one as in `Material #2`, begins no comment.
     """
-    text = _BEHIND_NAME.sub(b"", text).strip()
+    return _BEHIND_NAME.sub(b"", text).strip()
+
+
+def encoding_of(text: bytes) -> str:
+    """Return UTF-8 for what reads as that; else Latin-1, which has a letter for every byte."""
     try:
-        return text.decode()
+        text.decode()
     except UnicodeDecodeError:
-        return text.decode("latin-1")
+        return "latin-1"
+    return "utf-8"
 
 
 @dataclass(frozen=True, eq=False)

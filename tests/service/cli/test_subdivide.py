@@ -44,6 +44,27 @@ def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -
     assert "_PNS_RATIO" in attributes
 
 
+def test_materials_and_textures_follow_a_result_and_replace_nothing(
+    pns: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "other").mkdir()
+    obj = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
+    (tmp_path / "in.obj").write_text(obj)
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd t.png\n")
+    (tmp_path / "t.png").write_bytes(b"t")
+    (tmp_path / "other" / "m.mtl").write_text("newmtl b\n")
+    command = ["subdivide", "in.obj", "-o", "other/x.obj", "--report", "r.json", *ONCE]
+    told = pns(*command).err
+    assert "1 × copied beside the result: t.png" in told
+    assert "--force replaces them): m.mtl" in told
+    assert (tmp_path / "other" / "m.mtl").read_text() == "newmtl b\n"
+    assert "1 × copied beside the result: m.mtl" in pns(*command, "--force").err
+    assert (tmp_path / "other" / "m.mtl").read_text() == (tmp_path / "m.mtl").read_text()
+    assert "copied" not in pns(*command).err
+    # Beside its source nothing is to be copied.
+    assert "copied" not in pns("subdivide", "in.obj", "-o", "x.obj", *ONCE).err
+
+
 def test_what_happens_in_many_places_is_said_once(pns: Any, tmp_path: Path) -> None:
     tree, binary = files.document([{**box(), "mode": 5} for _ in range(3)], [box()])
     (tmp_path / "strips.glb").write_bytes(files.pack(tree, binary))

@@ -195,11 +195,6 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
             b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\nl 1 2\n",
             {"lines"},
         ),
-        (
-            "ply",
-            POLYGONS["ply"].replace(b"element", b"comment TextureFile a b.png\nelement", 1),
-            {"names of textures"},
-        ),
         ("stl", formats.write(part(), "stl")[:-2] + b"\x1f\x80", {"colours of faces"}),
         ("off", POLYGONS["off"], {"colours of faces"}),
     ],
