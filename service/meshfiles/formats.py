@@ -30,7 +30,7 @@ from .mesh_file import (
     shown,
 )
 from .obj import read_obj, write_obj
-from .off import read_off, write_off
+from .off import is_binary, read_off, write_off
 from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
@@ -72,6 +72,7 @@ FORMATS = {
     "off": Format(
         read_off,
         write_off,
+        bytes_per_byte=60,
         layers=frozenset({UV, NORMAL, COLOUR}),
         vertex_layers=None,
         face_values=frozenset({COLOUR}),
@@ -89,8 +90,9 @@ def memory_to_read(data: bytes, kind: str) -> int:
 
     A text takes them by its letters, its lines and its words, measured on the shortest of each.
     """
-    binary = (kind == "stl" and not is_text(data)) or (kind == "ply" and b"ascii" not in data[:200])
-    if binary:
+    binary = {"stl": lambda: not is_text(data), "ply": lambda: b"ascii" not in data[:200]}
+    binary["off"] = lambda: is_binary(data)
+    if kind in binary and binary[kind]():
         return FORMATS[kind].bytes_per_byte * len(data)
     lines = data.count(b"\n") + data.count(b"\r")
     return 8 * len(data) + 170 * lines + 130 * count_words(data)
