@@ -28,6 +28,8 @@ class Creases:
     Attributes:
         named: (N, 2) pairs of vertices; None for none.
         sharpness: (N,) sharpness of these, 0 … 1; None: 1.
+        wears: whether it counts levels, 0 … infinity, as OpenSubdiv's does: s at level 0, s − 1 at
+            level 1, and so on, and smooth from 0 on, whatever ``levels`` says.
         angle: find edges that turn by more than this, in degrees; None: find none.
         learned: ask the sharpness network of the scheme's model.
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
@@ -56,13 +58,15 @@ class Creases:
     vertex_sharpness: Float[np.ndarray, " M"] | None = None
     border: str = "smooth"
     soft_corners: Float[np.ndarray, " V"] | None = None
+    wears: bool = False
 
     def __post_init__(self) -> None:
         if self.named is not None:
             object.__setattr__(self, "named", as_pairs(self.named))
         if self.sharpness is not None:
-            expected = "a number from 0 to 1 for each named edge"
-            _check_numbers("sharpness", self.sharpness, self.named, 1.0, expected)
+            largest, range_ = (np.inf, "≥ 0") if self.wears else (1.0, "from 0 to 1")
+            expected = f"a number {range_} for each named edge"
+            _check_numbers("sharpness", self.sharpness, self.named, largest, expected)
         if self.vertices is not None:
             object.__setattr__(self, "vertices", as_vertices(self.vertices))
         if self.vertex_sharpness is not None:
@@ -78,14 +82,15 @@ class Creases:
             raise ParameterError("border", self.border, expected=", ".join(BORDERS))
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
-        """Return a copy with further pairs of vertices named, of sharpness 1."""
+        """Return a copy with further pairs of vertices named, sharp as long as the others may be."""
         if len(pairs) == 0:
             return self
         if self.named is None:
             return replace(self, named=pairs)
         sharpness = self.sharpness
         if sharpness is not None:
-            sharpness = np.concatenate([np.ones(len(pairs)), sharpness])
+            most = np.full(len(pairs), np.inf if self.wears else 1.0)
+            sharpness = np.concatenate([most, sharpness])
         return replace(self, named=np.concatenate([pairs, self.named]), sharpness=sharpness)
 
     @property
@@ -93,12 +98,13 @@ class Creases:
         """Tell whether edges are found by their shape."""
         return self.learned or self.angle is not None
 
-    @property
-    def sharp_pairs(self) -> Integer[np.ndarray, "N 2"] | None:
-        """The named edges that count as sharp: those of sharpness above ½."""
-        if self.named is None or self.sharpness is None:
+    def sharp_pairs(self, depth: int = 0) -> Integer[np.ndarray, "N 2"] | None:
+        """Return the named edges that count as sharp at a level: those of sharpness above ½."""
+        if self.named is None or not (self.wears or self.sharp_at(depth)):
+            return None
+        if self.sharpness is None:
             return self.named
-        return self.named[self.sharpness > MOSTLY_SHARP]
+        return self.named[self.sharpness - (depth if self.wears else 0) > MOSTLY_SHARP]
 
     def sharp_at(self, depth: int) -> bool:
         """Return whether the edges are sharp at a level; level 0 refines the control mesh."""
@@ -150,7 +156,7 @@ class Creases:
             return topology.with_creases(rows)
         sharpness = np.zeros(len(topology.edges))
         np.maximum.at(sharpness, rows, self.sharpness)
-        return topology.with_sharpness(sharpness)
+        return topology.with_wear(sharpness) if self.wears else topology.with_sharpness(sharpness)
 
     def found(
         self,

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ..report import Change
+from .tags import Tags
 
 # Layers are called as glTF calls attributes; other properties begin with an underscore.
 UV, NORMAL, COLOUR = "TEXCOORD_0", "NORMAL", "COLOR_0"
@@ -61,6 +62,7 @@ class MeshFile:
         encoding: of the names above, and of those in labels.
         double: whether a format that has both is to store positions as doubles.
         changes: what the reader dropped or mended.
+        tags: creases that the file states; None: it states none.
         parents: of a refined mesh, the vertices of the file that each vertex is made of.
     """
 
@@ -75,6 +77,7 @@ class MeshFile:
     encoding: str = "utf-8"
     double: bool = False
     changes: tuple[Change, ...] = ()
+    tags: Tags | None = None
     parents: SubdivisionMatrix | None = None
 
     @property

@@ -31,10 +31,11 @@ from .mesh_file import (
     dropped,
     offsets_of,
 )
+from .tags import Tags
 from .text import BLOCK, NUMBER, Text, cut_text, encoding_of, named, parsed, plain_text, rows_text
 
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
-_LIBRARY = b"mtllib"
+_LIBRARY, _TAG = b"mtllib", b"t"
 _DROPPED = {
     b"l": "lines",
     b"p": "points",
@@ -87,6 +88,7 @@ def read_obj(data: bytes) -> MeshFile:
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)
     others = ~(is_v | is_vt | is_vn | is_face)
+    tags = _tags(text, others, lost)
     labels, libraries, encoding = _statements(text, data, others, line, lost)
     return MeshFile(
         vertices,
@@ -96,6 +98,7 @@ def read_obj(data: bytes) -> MeshFile:
         labels=labels,
         libraries=libraries,
         encoding=encoding,
+        tags=tags,
         changes=dropped(lost),
     )
 
@@ -219,6 +222,15 @@ def _rows(
     return rows
 
 
+def _tags(text: Text, others: Bool[np.ndarray, " L"], lost: Counter[str]) -> Tags | None:
+    """Return what OpenSubdiv's tags state; None without any that is understood."""
+    tags = Tags()
+    for line in np.flatnonzero(others & text.keyword(_TAG)).tolist():
+        first = text.first[line]
+        tags.read([text.word(first + k) for k in range(1, text.counts[line])], lost)
+    return tags if tags.edges or tags.vertices or tags.border else None
+
+
 def _statements(
     text: Text,
     data: bytes,
@@ -245,7 +257,7 @@ def _statements(
                 given[known[word]].append((line, name))
         elif word in _DROPPED:
             lost[_DROPPED[word]] += 1
-        else:
+        elif word != _TAG:
             lost["other statements"] += 1
     encoding = encoding_of(b"".join([*libraries, *(n for own in given.values() for _, n in own)]))
     labels: dict[str, Labels] = {}

@@ -236,5 +236,6 @@ def joined(
         face_values={name: values[ranks] for name, values in mesh.face_values.items()},
         labels=labels,
         changes=(),
+        tags=None,
         parents=None if parents is None else parents.take(used),
     )

@@ -173,6 +173,10 @@ def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
 
 
 def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
+    if options.crease == "auto" and mesh.tags is not None:
+        vertex_of = np.full(len(mesh.vertices), NONE)
+        vertex_of[mesh.corners[control.places]] = control.mesh.corners
+        return mesh.tags.creases(control.mesh, vertex_of, options.border)
     if options.crease == "normals":
         return Creases(_hard_edges(control, mesh), border=options.border)
     return replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
@@ -230,6 +234,7 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
         face_values={name: values[of_face] for name, values in mesh.face_values.items()},
         labels={kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
         changes=(),
+        tags=None,
     )
 
 

@@ -113,7 +113,7 @@ def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Cre
 
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
     """Return the named edges that are sharp at the last level."""
-    return creases.sharp_pairs if creases.sharp_at(levels - 1) else None
+    return creases.sharp_pairs(levels - 1)
 
 
 def refined_mesh(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 
+from pns_common.mesh.creases import Creases
 from pns_common.operator.scheme import Scheme
 from pns_common.progress import LEARNED_COST
 from pns_common.schemes.matrix import SubdivisionMatrix
@@ -205,18 +206,23 @@ def refine_alone(
     traced: bool = False,
     chosen: Chosen | None = None,
     found: Sequence[Found] | None = None,
+    stated: Callable[[ControlMesh], Creases] | None = None,
 ) -> MeshOutcome:
     """Refine one mesh, given by its primitives.
 
     `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone;
-    `found` are polygons of its triangles, for a scheme of polygons.
+    `found` are polygons of its triangles, for a scheme of polygons; `stated` gives creases in place
+    of those that the options ask for.
     """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options)
         if found is not None:
             control = control.joined(found)
-        creases = creases_of(control, options, scheme)
+        if stated is None or control.is_empty:
+            creases = creases_of(control, options, scheme)
+        else:
+            creases = stated(control)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)
