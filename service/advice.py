@@ -81,7 +81,7 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
         touching = edges["boundary"] or edges["irregular"]
         risk = "; gaps may open where pieces touch" if touching else ""
         return [f"{kept} crease=off to round all of them{risk}"]
-    if edges["boundary"] >= MOST_OPEN * total:
+    if edges["boundary"] >= MOST_OPEN * total and not _is_one_face(levels[0]):
         return [
             f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "
             "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
@@ -89,3 +89,12 @@ def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
     if levels[-1]["normal_jump_max"] < BENT and not creases and not edges.get("soft"):
         return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
     return []
+
+
+def _is_one_face(level: LevelReport) -> bool:
+    """Return whether a level refined a single face, which has no other to be joined with.
+
+    A triangle becomes four, with three new vertices; a polygon of n corners n quads, with n + 1.
+    """
+    border = level["edges"]["boundary"]
+    return level["faces"] in (4, border) and level["vertices"] <= 2 * border + 1

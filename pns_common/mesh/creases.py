@@ -82,7 +82,7 @@ class Creases:
             raise ParameterError("border", self.border, expected=", ".join(BORDERS))
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
-        """Return a copy with further pairs of vertices named, sharp as long as the others may be."""
+        """Return a copy with further pairs of vertices named, as sharp as any may be."""
         if len(pairs) == 0:
             return self
         if self.named is None:

@@ -152,12 +152,13 @@ def _convert_one(
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     name = "stdout" if job.output == STREAM else job.output
-    made, triangles = f"{written.faces:,} faces", written.triangles
-    made += f", {triangles:,} triangles," if triangles != written.faces else ""
+    # What formats of triangles hold; a file of quads alone is counted in its faces.
+    polygons = written.triangles != written.faces and job.target not in (*GLTF_KINDS, "stl")
+    count, what = (written.faces, "faces") if polygons else (written.triangles, "triangles")
     more = ""
     if options.levels < MAX_LEVELS and not options.selects:
-        more = f"; --levels {options.levels + 1} would give {4 * triangles:,} triangles"
-    console.print(f"{name}: {made} in {seconds:.1f} s{more}", markup=False)
+        more = f"; --levels {options.levels + 1} would give {4 * count:,}"
+    console.print(f"{name}: {count:,} {what} in {seconds:.1f} s{more}", markup=False)
 
 
 def _copies(job: _Job, data: bytes, siblings: SiblingFiles, *, force: bool) -> list[Change]:

@@ -28,7 +28,7 @@ _COUNTS = re.compile(rb"(\d{1,9})/(\d{1,9})/(\d{1,9})")
 
 @dataclass
 class Tags:
-    """What tags say of the vertices of a file.
+    """Sharpness and borders that tags state for the vertices of a file.
 
     Attributes:
         edges: sharpness by pairs of vertices.

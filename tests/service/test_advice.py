@@ -7,7 +7,7 @@ import pytest
 
 from pns_common import loop
 from service.gltf.subdivide import subdivide_gltf
-from service.meshfiles.convert import as_flags
+from service.meshfiles.convert import as_flags, converted
 from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
@@ -78,6 +78,18 @@ def test_a_flat_sheet_says_that_it_is_flat():
     }
     (line,) = advice([sheet])
     assert line.startswith("the shape is flat")
+
+
+@pytest.mark.parametrize("faces", ["f 1 2 3", "f 1 2 3 4", "f 1 2 3 4 5"])
+@pytest.mark.parametrize("count", [1, 2])
+def test_only_faces_that_have_others_are_to_be_joined(faces, count):
+    corners = [(0, 0), (2, 0), (2, 2), (1, 3), (0, 2)]
+    lines = [f"v {x + 9 * k} {y} 0" for k in range(count) for x, y in corners]
+    lines += [faces, faces.translate(str.maketrans("12345", "6789X")).replace("X", "10")][:count]
+    options = Options(scheme="loop" if faces == "f 1 2 3" else "catmull-clark")
+    made = converted("\n".join(lines).encode(), "obj", "obj", options, None, Limits())
+    (line,) = made.report["advice"]
+    assert ("weld_tolerance" in line) == (count == 2)
 
 
 def test_mesh_files_say_the_same_and_the_command_spells_its_own_options():
