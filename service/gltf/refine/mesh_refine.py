@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +45,7 @@ class RefinedMesh:
         limit_normals: of the limit surface, if the vertices are on it.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
+        levels: the topologies that were refined, control mesh first; none for a union.
     """
 
     mesh: Mesh
@@ -55,6 +57,7 @@ class RefinedMesh:
     limit_normals: Float[np.ndarray, "V 3"] | None
     parents: SubdivisionMatrix | None = None
     topology: Topology | None = None
+    levels: Sequence[Topology] = ()
 
 
 def creases_of(
@@ -154,6 +157,7 @@ def refined_mesh(
         made.normals,
         made.parents if traced else None,
         levels[0],
+        levels,
     )
 
 

@@ -38,6 +38,7 @@ from .mesh_refine import (
     sharp_after,
 )
 from .new_normals import with_normal_rule, with_smooth_normals
+from .outlines import refined_outlines, with_outline
 from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces
 from .together import MeshOutcome, StageShares, kind_of, refine_together
@@ -241,6 +242,12 @@ def refine_alone(
                 )
             else:
                 refined = refined_primitives(control, made, grid, blend, course, cut)
+            for number, edges in refined_outlines(control, made.levels).items():
+                source = control.primitives[number].number
+                refined = [
+                    with_outline(each, edges) if each.source.number == source else each
+                    for each in refined
+                ]
             if cut is not None and made.parents is not None:
                 made = replace(made, parents=made.parents.unmoved(cut.still))
     changes = [
