@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -16,6 +17,7 @@ from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
 
 HALF_TURN = 180
+_ANGLE = re.compile(r"angle:(\d{1,3}(?:\.\d+)?)")
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
 # OpenSubdiv the first are its VTX_BOUNDARY_EDGE_ONLY and VTX_BOUNDARY_EDGE_AND_CORNER.
 BORDERS = ("smooth", "corners", "fixed")
@@ -176,18 +178,39 @@ NO_CREASES = Creases()
 
 
 def chosen_creases(
-    given: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, automatic: Creases
+    given: Integer[np.ndarray, "N 2"] | Creases | str | None, automatic: Creases
 ) -> Creases:
     """Return the creases that an argument asks for; "auto": those of the scheme.
 
+    "off" and None are no creases; "angle:40" is edges that turn by more than 40 degrees.
+
     Raises:
-        ParameterError: another word, or no pairs of whole numbers.
+        ParameterError: another word, an angle out of range, or no pairs of whole numbers.
     """
     if isinstance(given, str):
-        if given != "auto":
-            raise ParameterError("creases", given, expected='"auto", None or pairs of vertices')
-        return automatic
+        if given in ("auto", "off"):
+            return automatic if given == "auto" else NO_CREASES
+        if (found := _ANGLE.fullmatch(given)) is None:
+            expected = '"auto", "off", "angle:" and degrees, None, or pairs of vertices'
+            raise ParameterError("creases", given, expected=expected)
+        return Creases(angle=float(found[1]))
     return given if isinstance(given, Creases) else Creases(given)
+
+
+def one_of_creases(
+    creases: Integer[np.ndarray, "N 2"] | Creases | str | None,
+    crease: Integer[np.ndarray, "N 2"] | Creases | str | None,
+) -> Integer[np.ndarray, "N 2"] | Creases | str | None:
+    """Return the one of two names of an argument that is given; "auto" without any.
+
+    Raises:
+        ParameterError: both are.
+    """
+    if isinstance(crease, str) and crease == "auto":
+        return creases
+    if not (isinstance(creases, str) and creases == "auto"):
+        raise ParameterError("crease", crease, expected="no other value than that of creases")
+    return crease
 
 
 def edge_cosines(
