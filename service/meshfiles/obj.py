@@ -32,7 +32,18 @@ from .mesh_file import (
     offsets_of,
 )
 from .tags import Tags
-from .text import BLOCK, NUMBER, Text, cut_text, encoding_of, named, parsed, plain_text, rows_text
+from .text import (
+    BLOCK,
+    NUMBER,
+    Text,
+    cut_text,
+    encoding_of,
+    named,
+    parsed,
+    plain_text,
+    rows_text,
+    whole_rows,
+)
 
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
 _LIBRARY, _TAG = b"mtllib", b"t"
@@ -138,14 +149,20 @@ def _references(
         references[:, 0] = text.numbers(words, np.int64)
         return references, sizes
     blank = letters <= ord(" ")
-    slashes = np.searchsorted(
-        np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
-    )
-    counts = 1 + np.diff(slashes, prepend=0)
+    at, ends = np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
     corners = np.where(blank, np.uint8(ord(" ")), letters).tobytes()
     # What is left out is 0.
     corners = corners.replace(b"//", b"/0/").replace(b"/ ", b"/0 ").replace(b"/", b" ")
     values = parsed(corners, np.int64)
+    each, rest = divmod(len(at), len(words))
+    if not rest and each < 3 and len(values) == (1 + each) * len(words):
+        at = at.reshape(len(words), each)
+        # As many slashes in every word, as nearly all files have.
+        if (at[:, -1] < ends).all() and (at[1:, 0] > ends[:-1]).all():
+            references = np.zeros((len(words), 3), dtype=np.int64)
+            references[:, : 1 + each] = values.reshape(len(words), -1)
+            return references, sizes
+    counts = 1 + np.diff(np.searchsorted(at.reshape(-1), ends), prepend=0)
     if counts.max() > 3 or len(values) != counts.sum():
         bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
         raise text.word_fault(bad, "no corner of a face")
@@ -328,10 +345,16 @@ def _run_text(
     mesh: MeshFile, begin: int, end: int, uv: Layer | None, normals: Layer | None
 ) -> Iterator[str]:
     """Write faces that all have the same kinds of references."""
-    form = " %d" + ("/%d" if uv is not None else "/" if normals is not None else "")
-    form += "/%d" if normals is not None else ""
+    form = " %" + ("/%" if uv is not None else "/" if normals is not None else "")
+    form += "/%" if normals is not None else ""
     columns = [mesh.corners, *(layer.rows for layer in (uv, normals) if layer is not None)]
     sizes = mesh.sizes
+    if (sizes[begin:end] == sizes[begin]).all():
+        size, share = int(sizes[begin]), slice(mesh.offsets[begin], mesh.offsets[end])
+        numbers = np.stack([column[share] + 1 for column in columns], axis=1)
+        yield from whole_rows(f"f{form * size}\n".encode(), numbers.reshape(end - begin, -1))
+        return
+    form = form.replace("%", "%d")
     for start in range(begin, end, BLOCK):
         stop = min(start + BLOCK, end)
         share = slice(mesh.offsets[start], mesh.offsets[stop])

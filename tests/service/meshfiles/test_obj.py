@@ -9,6 +9,7 @@ from service.meshfiles.convert import converted
 from service.meshfiles.mesh_file import MATERIAL, NORMAL, UV
 from service.meshfiles.obj import read_obj, write_obj
 from service.meshfiles.parts import chosen_of
+from service.meshfiles.text import whole_rows
 from service.options import Limits, Options
 from tests.support.gltf import files
 
@@ -173,3 +174,25 @@ def test_quads_without_texture_coordinates_leave_no_value_behind():
     layer = read_obj(converted(data, "obj", "obj", options, None, Limits()).content).layers[UV]
     assert (layer.rows < 0).reshape(-1, 4).all(axis=1).tolist() == [False] * 4 + [True] * 4
     assert np.unique(layer.rows).tolist() == [-1, *range(len(layer.values))]
+
+
+@pytest.mark.parametrize("largest", [1, 9, 10, 99_999, 4_294_967_296])
+def test_rows_of_whole_numbers_are_written_as_python_writes_them(largest):
+    numbers = np.random.default_rng(0).integers(0, largest, (20_000, 4), endpoint=True)
+    numbers[0], numbers[1] = 0, largest
+    made = "".join(whole_rows(b"f %/% %//%\n", numbers))
+    assert made == "".join("f {}/{} {}//{}\n".format(*row) for row in numbers.tolist())
+
+
+def test_corners_with_as_many_slashes_in_all_are_read_word_by_word():
+    """Six slashes and three words, of which one has none; and the parts that are left out."""
+    vt = "vt 0 0\nvt 1 1\nvn 0 0 1\n"
+    read = read_obj((POSITIONS + vt + "f 1//1 2 3/2/1\nf 4/1/ 5/2 6//1\n").encode())
+    assert read.corners.tolist() == [0, 1, 2, 3, 4, 5]
+    told = {change.what for change in read.changes}
+    assert told == {
+        "texture coordinates of faces of which not all corners have some dropped",
+        "vertex normals of faces of which not all corners have some dropped",
+    }
+    with pytest.raises(UnreadableError, match=r"'1/1/1/1' is no corner"):
+        read_obj((POSITIONS + vt + "f 1/1/1/1 2/2 3/2/1\n").encode())
