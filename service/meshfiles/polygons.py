@@ -173,13 +173,14 @@ def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
 
 
 def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
-    if options.crease == "auto" and mesh.tags is not None:
-        vertex_of = np.full(len(mesh.vertices), NONE)
-        vertex_of[mesh.corners[control.places]] = control.mesh.corners
-        return mesh.tags.creases(control.mesh, vertex_of, options.border)
     if options.crease == "normals":
         return Creases(_hard_edges(control, mesh), border=options.border)
-    return replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    found = replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    if options.crease != "auto" or mesh.tags is None:
+        return found
+    vertex_of = np.full(len(mesh.vertices), NONE)
+    vertex_of[mesh.corners[control.places]] = control.mesh.corners
+    return mesh.tags.creases(control.mesh, vertex_of, found)
 
 
 def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:

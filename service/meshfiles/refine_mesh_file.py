@@ -136,18 +136,18 @@ def _refine_triangles(
     )
 
 
-def _stated(mesh: MeshFile, options: Options) -> Callable[[ControlMesh], Creases] | None:
+def _stated(mesh: MeshFile, options: Options) -> Callable[[ControlMesh, Creases], Creases] | None:
     """Return how creases that a file states are found in its control mesh; None: not asked for."""
     tags = mesh.tags
     if tags is None or options.crease != "auto":
         return None
 
-    def creases(control: ControlMesh) -> Creases:
+    def creases(control: ControlMesh, found: Creases) -> Creases:
         rows = np.concatenate([primitive.rows for primitive in control.primitives])
         welded = control.weld.vertex_of
         vertex_of = np.full(len(mesh.vertices), NONE)
         vertex_of[rows[welded >= 0]] = control.cleaned.vertex_map[welded[welded >= 0]]
-        return tags.creases(control.mesh, vertex_of, options.border)
+        return tags.creases(control.mesh, vertex_of, found)
 
     return creases
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -69,11 +69,12 @@ class Tags:
         else:
             self.vertices |= dict(zip(vertices, sharpness, strict=True))
 
-    def creases(self, mesh: Mesh, vertex_of: Int[np.ndarray, " N"], border: str) -> Creases:
+    def creases(self, mesh: Mesh, vertex_of: Int[np.ndarray, " N"], found: Creases) -> Creases:
         """Return what is stated for a mesh, whose vertex `vertex_of` gives for each of the file's.
 
-        It is −1 where there is none. Pairs that are no edges are left out. `border` holds unless it
-        is "smooth", and another is stated.
+        It is −1 where there is none. Pairs that are no edges are left out. Beside edges that a
+        model found, what is stated lasts as long as these. The border of `found` holds unless it is
+        "smooth", and another is stated.
         """
         given = np.array([*self.edges], dtype=np.int64).reshape(-1, 2)
         pairs, sharpness = _found(given, vertex_of), np.array([*self.edges.values()])
@@ -81,13 +82,24 @@ class Tags:
         known = np.isin(np.sort(pairs, axis=1) @ keys, sides @ keys) & (pairs >= 0).all(axis=1)
         vertices = _found(np.array([*self.vertices], dtype=np.int64), vertex_of)
         there, at_vertices = vertices >= 0, np.array([*self.vertices.values()])
-        return Creases(
+        stated = Creases(
             pairs[known],
             sharpness[known],
             vertices=vertices[there],
             vertex_sharpness=at_vertices[there],
-            border=self.border or border if border == "smooth" else border,
+            border=(self.border or "smooth") if found.border == "smooth" else found.border,
             wears=True,
+        )
+        if found.named is None:
+            return stated
+        own = np.ones(len(found.named)) if found.sharpness is None else found.sharpness
+        return replace(
+            stated,
+            named=np.concatenate([pairs[known], found.named]),
+            sharpness=np.concatenate([np.minimum(sharpness[known], 1.0), own]),
+            levels=found.levels,
+            soft_corners=found.soft_corners,
+            wears=False,
         )
 
 

@@ -207,23 +207,22 @@ def refine_alone(
     traced: bool = False,
     chosen: Chosen | None = None,
     found: Sequence[Found] | None = None,
-    stated: Callable[[ControlMesh], Creases] | None = None,
+    stated: Callable[[ControlMesh, Creases], Creases] | None = None,
 ) -> MeshOutcome:
     """Refine one mesh, given by its primitives.
 
     `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone;
-    `found` are polygons of its triangles, for a scheme of polygons; `stated` gives creases in place
-    of those that the options ask for.
+    `found` are polygons of its triangles, for a scheme of polygons; `stated` adds creases to
+    those that the options ask for.
     """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options)
         if found is not None:
             control = control.joined(found)
-        if stated is None or control.is_empty:
-            creases = creases_of(control, options, scheme)
-        else:
-            creases = stated(control)
+        creases = creases_of(control, options, scheme)
+        if stated is not None and not control.is_empty:
+            creases = stated(control, creases)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pns_common import load_model
 from service.meshfiles.convert import converted
 from service.meshfiles.obj import read_obj
 from service.options import Limits, Options
@@ -90,3 +91,15 @@ def test_tags_that_say_nothing_of_the_mesh_are_passed_over_or_told() -> None:
     }
     ours = corners_of(text_of(points, faces, tags), 1, scheme="catmull-clark")
     assert (ours == corners_of(text_of(points, faces, ""), 1, scheme="catmull-clark")).all()
+
+
+def test_with_a_model_tags_stand_beside_the_edges_that_it_finds() -> None:
+    points, faces = shape(CUBE, triangles=False)
+    tags = "t crease 2/1/0 0 1 9"
+    bare, marked = (
+        converted(data, "obj", "obj", Options(), load_model(), Limits()).report["levels"][0]
+        for data in (text_of(points, faces, ""), text_of(points, faces, tags))
+    )
+    found = bare["edges"]["soft"]
+    assert found > 6
+    assert (marked["edges"]["crease"], marked["edges"]["soft"]) == (1, found - 1)
