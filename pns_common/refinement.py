@@ -13,7 +13,7 @@ from jaxtyping import Float, Integer
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import loop as kernels
 from pns_common.memory import keep_freed_memory, memory_here
-from pns_common.mesh.creases import Creases, chosen_creases
+from pns_common.mesh.creases import Creases, chosen_creases, one_of_creases
 from pns_common.mesh.mesh import LARGEST_COORDINATE, Mesh, as_html, check_is_mesh
 from pns_common.mesh.quads import QUAD
 from pns_common.mesh.reference_length import measure_reference_length
@@ -148,7 +148,8 @@ def refine(
     reference_length: float | str = "auto",
     *,
     limit: bool = True,
-    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | str | None = "auto",
+    crease: Integer[np.ndarray, "N 2"] | Creases | str | None = "auto",
     border: Literal["smooth", "corners", "fixed"] | None = None,
     faces: Any = None,
     threads: int | None = None,
@@ -174,7 +175,9 @@ def refine(
             them in either case.
         creases: edges to keep sharp, as pairs of vertices: for good, boundaries alike (Hoppe et al.
             1994). "auto": the scheme's own, at as many levels as the model's card says: each edge
-            as sharp as the sharpness network finds it; none without one. None: no edge.
+            as sharp as the sharpness network finds it; none without one. "off" or None: no edge.
+            "angle:40": edges that turn by more than 40 degrees.
+        crease: another name of ``creases``, as the command line has it.
         border: what boundaries do; see ``Creases``. None: as ``creases`` say, or "smooth".
         faces: refine these alone, by number or as a mask. Triangles beside them are cut to meet
             them; over Catmull–Clark any face beside them gets their new vertices as corners. Other
@@ -195,7 +198,7 @@ def refine(
     length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
     if not is_bool(limit):
         raise ParameterError("limit", limit, expected="True or False")
-    kept = chosen_creases(creases, scheme.creases)
+    kept = chosen_creases(one_of_creases(creases, crease), scheme.creases)
     kept = kept if border is None else replace(kept, border=border)
     learned = count if scheme.learned_levels is None else min(count, scheme.learned_levels)
     limit = limit and scheme.base.limit is not None
@@ -274,7 +277,7 @@ def control_level(
     mesh: Mesh,
     scheme: Scheme,
     reference_length: float | str = "auto",
-    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None = "auto",
+    creases: Integer[np.ndarray, "N 2"] | Creases | str | None = "auto",
     threads: int | None = None,
 ) -> Level:
     """Return the level that the first step of ``refine`` reads: for training and experiments.

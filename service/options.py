@@ -127,7 +127,8 @@ DESCRIPTIONS = {
     "for auto makes quads by Catmull-Clark, and pns triangles. loop: the classic rules for "
     "triangles; polygons are cut. catmull-clark: the classic rules for polygons",
     "budget": "C, dimensionless: how far the model may go from Loop. Default: the model's own",
-    "reference_length": "R, the unit of length of the budget; auto measures each mesh",
+    "reference_length": "R, the unit of length of the budget. auto measures each mesh: the largest "
+    "distance of a vertex from the centroid of all, over √2",
     "diagnostics": "what a glTF carries of the report. full: also the vertex attributes "
     "_PNS_RATIO and _PNS_GATE of the last learned level",
     "uv": "smooth: Loop's stencil inside charts; their boundaries stay linear",
@@ -140,7 +141,8 @@ DESCRIPTIONS = {
     "where the file's normals differ. off: none, everything becomes round",
     "weld": "which vertices are one. position: those in one place. index: those that the file "
     "gives one number, so that poses keep one numbering. off: corners alike in all they have",
-    "weld_tolerance": f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than this times R",
+    "weld_tolerance": f"0 to {MAX_WELD_TOLERANCE}: join vertices nearer than this share of the "
+    "mesh's size R, the largest distance of a vertex from the centroid of all, over √2",
     "border": "boundaries. smooth: curves. corners: curves that end at vertices of one face. "
     "fixed: as they are",
     "polygons": "triangles of a glTF. auto: joined to the quads that most of them are halves of, "

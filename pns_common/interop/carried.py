@@ -7,7 +7,7 @@ interpolated linearly along each edge, which leaves them as they were at old ver
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, SupportsIndex
 
@@ -17,15 +17,16 @@ from jaxtyping import Float, Integer
 from pns_common.carry.carried import Carried, Column, Columns, rule_for
 from pns_common.carry.carried import refine_carried as refine_columns
 from pns_common.errors import ParameterError
-from pns_common.mesh.creases import Creases
+from pns_common.mesh.creases import Creases, one_of_creases
 from pns_common.mesh.mesh import Mesh
 from pns_common.mesh.rows import distinct_rows, number_by_first_appearance
-from pns_common.mesh.topology import check_vertices
+from pns_common.mesh.topology import Topology, check_vertices
 from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks
 from pns_common.refinement import Refinement, refine
 
 Data = Mapping[str, np.ndarray]
+NO_LINES = np.zeros((0, 2), dtype=np.int64)
 
 
 def _nothing() -> Data:
@@ -42,6 +43,8 @@ class CarriedMesh:
         points: data of vertices by name, (V, …) each.
         corners: data of face corners by name, (F, N, …) each; (H, …) where degrees differ.
         cells: data of faces by name, (F, …) each.
+        lines: (L, 2) vertices that are lines of their own; those on edges follow these.
+        line_parents: (L,) of a refined mesh, the line that each is a part of.
     """
 
     vertices: Float[np.ndarray, "V 3"]
@@ -49,6 +52,8 @@ class CarriedMesh:
     points: Data = field(default_factory=_nothing)
     corners: Data = field(default_factory=_nothing)
     cells: Data = field(default_factory=_nothing)
+    lines: Integer[np.ndarray, "L 2"] = field(default_factory=lambda: NO_LINES)
+    line_parents: Integer[np.ndarray, " L"] = field(default_factory=lambda: NO_LINES[:, 0])
 
 
 def refine_carried(
@@ -70,9 +75,9 @@ def refine_carried(
     joined = first = np.arange(len(given.vertices))
     if weld == "position":
         joined, first = join_by_position(given.vertices)
-    creases = options.get("creases", "auto")
-    if creases is not None and not isinstance(creases, str):
-        options["creases"] = _renamed(creases, joined)
+    creases = one_of_creases(options.get("creases", "auto"), options.pop("crease", "auto"))
+    named = creases is not None and not isinstance(creases, str)
+    options["creases"] = _renamed(creases, joined) if named else creases
     surface_faces = joined[given.corners], given.offsets
     refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
 
@@ -95,7 +100,30 @@ def refine_carried(
     surface[: len(joined)] = joined
     surface[faces.reshape(-1)] = refinement.mesh.faces.reshape(-1)
     positions = refinement.mesh.vertices[surface]
-    return CarriedMesh(positions, faces, points, corners, cells), refinement
+    lines = _refined_lines(mesh.lines, topologies)
+    return CarriedMesh(positions, faces, points, corners, cells, *lines), refinement
+
+
+def _refined_lines(
+    lines: Integer[np.ndarray, "N 2"], topologies: Sequence[Topology]
+) -> tuple[Integer[np.ndarray, "M 2"], Integer[np.ndarray, " M"]]:
+    """Return the parts of lines, in order and direction, and which line each is of."""
+    parents = np.arange(len(lines))
+    if not len(lines):
+        return lines, parents
+    # Edges are refined, and what is none stays.
+    keys = [max(int(lines.max()) + 1, topologies[0].vertex_count), 1]
+    edges = topologies[0].edges.astype(np.int64) @ keys
+    known = np.isin(np.sort(lines, axis=1) @ keys, edges)
+    parts, of_part = lines[known], parents[known]
+    for topology in topologies:
+        middle = topology.vertex_count + topology.rows_of(parts)
+        parts = np.stack([parts[:, 0], middle, middle, parts[:, 1]], axis=1).reshape(-1, 2)
+        of_part = np.repeat(of_part, 2)
+    made = np.concatenate([parts, lines[~known]])
+    of_line = np.concatenate([of_part, parents[~known]])
+    order = np.argsort(of_line, kind="stable")
+    return made[order], of_line[order]
 
 
 def _columns(data: Data) -> Columns:

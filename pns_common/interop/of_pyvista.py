@@ -1,4 +1,4 @@
-"""pyvista.PolyData: point, cell and field data are kept, but for normals."""
+"""pyvista.PolyData: point, cell and field data are kept and stay active, but for normals."""
 
 from __future__ import annotations
 
@@ -55,8 +55,15 @@ def write_pyvista(refined: CarriedMesh, given: Any) -> Any:
     for name, values in given.field_data.items():
         made.field_data[name] = values
     for here, there in ((made.point_data, given.point_data), (made.cell_data, given.cell_data)):
-        if there.active_scalars_name in here:
-            here.active_scalars_name = there.active_scalars_name
+        for kind in ("active_scalars_name", "active_vectors_name"):
+            if (name := getattr(there, kind)) in here:
+                setattr(here, kind, name)
+    # Which of both the mesh shows.
+    for kind in ("scalars", "vectors", "tensors"):
+        shown = getattr(given, f"active_{kind}_info")
+        data = made.cell_data if shown.association.name == "CELL" else made.point_data
+        if shown.name in data:
+            getattr(made, f"set_active_{kind}")(shown.name, shown.association.name.lower())
     texture = given.point_data.active_texture_coordinates_name
     if texture is not None:
         made.point_data.active_texture_coordinates_name = texture

@@ -1,4 +1,4 @@
-"""trimesh.Trimesh: texture coordinates and material, colours, attributes and metadata are kept."""
+"""trimesh.Trimesh: texture coordinates, material, colours, attributes, density, metadata stay."""
 
 from __future__ import annotations
 
@@ -43,6 +43,9 @@ def write_trimesh(refined: CarriedMesh, given: Any) -> Any:
         metadata=copy.deepcopy(given.metadata),
         process=False,
     )
+    # Asking for a density that was not given would measure the mesh.
+    if "density" in given._data:
+        made.density = given.density
     if "uv" in refined.points:
         made.visual = type(given.visual)(uv=refined.points["uv"], material=given.visual.material)
     return made

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
+from inspect import signature
 from operator import methodcaller
 from types import MappingProxyType
 from typing import Any, SupportsIndex, TypeVar, cast
@@ -27,10 +29,14 @@ Kind = TypeVar("Kind")
 
 @dataclass(frozen=True)
 class Adapter:
-    """Functions that read a library's mesh, make one like it, and cut its polygons, if any."""
+    """Functions that read a library's mesh, make one like it, and cut its polygons, if any.
+
+    ``count`` returns the number of its faces.
+    """
 
     read: Callable[[Any], CarriedMesh]
     write: Callable[[CarriedMesh, Any], Any]
+    count: Callable[[Any], int]
     polygons: bool = False
     triangulated: Callable[[Any], Any] | None = None
 
@@ -38,12 +44,20 @@ class Adapter:
 # By package and class, so that a mesh is recognised without importing its library.
 ADAPTERS = MappingProxyType(
     {
-        ("trimesh", "Trimesh"): Adapter(read_trimesh, write_trimesh),
+        ("trimesh", "Trimesh"): Adapter(read_trimesh, write_trimesh, lambda mesh: len(mesh.faces)),
         ("pyvista", "PolyData"): Adapter(
-            read_pyvista, write_pyvista, True, methodcaller("triangulate")
+            read_pyvista,
+            write_pyvista,
+            lambda mesh: len(mesh.faces) + mesh.n_strips,
+            True,
+            methodcaller("triangulate"),
         ),
-        ("meshio", "Mesh"): Adapter(read_meshio, write_meshio, True, triangulated_meshio),
-        ("open3d", "TriangleMesh"): Adapter(read_open3d, write_open3d),
+        ("meshio", "Mesh"): Adapter(
+            read_meshio, write_meshio, lambda mesh: len(mesh.cells), True, triangulated_meshio
+        ),
+        ("open3d", "TriangleMesh"): Adapter(
+            read_open3d, write_open3d, lambda mesh: len(mesh.triangles)
+        ),
     }
 )
 
@@ -88,19 +102,23 @@ def subdivide(
         levels: number of steps, 1 … 16.
         scheme: as for ``refine``; None for ``pns(load_model())``, which takes polygons too.
         triangulate: cut polygons into triangles first, which is right for convex ones.
-        options: further arguments of ``refine``: ``reference_length``, ``creases``, …
+        options: further arguments of ``refine``: ``reference_length``, ``crease`` (or ``creases``:
+            "auto", "off", "angle:40", pairs of vertices), …
 
     Raises:
         ParameterError: it is a mesh of none of these kinds, or of a library that holds triangles
             alone and the scheme makes quads; and as ``refine``.
         MeshError: it has cells that are no faces; and as ``refine`` and ``Mesh``.
+        TypeError: an option of another name, with the nearest one.
     """
+    _check_names(options)
     given: Any = mesh
     scheme = pns(load_model()) if scheme is None else scheme
     if collection := _of_class(mesh, COLLECTIONS):
 
         def refined(part: Any) -> Any:
-            if _of_class(part, COLLECTIONS) is None and _of_class(part, ADAPTERS) is None:
+            adapter = _of_class(part, ADAPTERS)
+            if _of_class(part, COLLECTIONS) is None and not (adapter and adapter.count(part)):
                 return part
             return subdivide(part, levels, scheme, triangulate=triangulate, **options)
 
@@ -126,6 +144,15 @@ def subdivide(
         raise ParameterError("scheme", chosen.name, expected=expected)
     carried, _ = refine_carried(read, chosen, levels, options)
     return adapter.write(carried, mesh)
+
+
+def _check_names(options: Mapping[str, Any]) -> None:
+    """Raise TypeError for an option that is none, with the one that is meant."""
+    known = ("weld", *tuple(signature(refine).parameters)[3:])
+    for name in options.keys() - set(known):
+        near = get_close_matches(name, (*known, "levels", "scheme", "triangulate"), 1, 0.5)
+        meant = f": {near[0]} is meant?" if near else f"; there are {', '.join(known)}"
+        raise TypeError(f"subdivide() has no option {name!r}{meant}")
 
 
 def _adapter(mesh: object) -> Adapter:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -16,6 +17,7 @@ from pns_common.parallel import Blocks
 from pns_common.parameters import is_number, is_whole
 
 HALF_TURN = 180
+_ANGLE = re.compile(r"angle:(\d{1,3}(?:\.\d+)?)")
 # What boundaries do: curves; curves but for the corners of single faces; or nothing at all. Of
 # OpenSubdiv the first are its VTX_BOUNDARY_EDGE_ONLY and VTX_BOUNDARY_EDGE_AND_CORNER.
 BORDERS = ("smooth", "corners", "fixed")
@@ -28,6 +30,8 @@ class Creases:
     Attributes:
         named: (N, 2) pairs of vertices; None for none.
         sharpness: (N,) sharpness of these, 0 … 1; None: 1.
+        wears: whether it counts levels, 0 … infinity, as OpenSubdiv's does: s at level 0, s − 1 at
+            level 1, and so on, and smooth from 0 on, whatever ``levels`` says.
         angle: find edges that turn by more than this, in degrees; None: find none.
         learned: ask the sharpness network of the scheme's model.
         levels: at how many levels the edges are sharp (semi-sharp creases, DeRose, Kass and Truong
@@ -56,13 +60,15 @@ class Creases:
     vertex_sharpness: Float[np.ndarray, " M"] | None = None
     border: str = "smooth"
     soft_corners: Float[np.ndarray, " V"] | None = None
+    wears: bool = False
 
     def __post_init__(self) -> None:
         if self.named is not None:
             object.__setattr__(self, "named", as_pairs(self.named))
         if self.sharpness is not None:
-            expected = "a number from 0 to 1 for each named edge"
-            _check_numbers("sharpness", self.sharpness, self.named, 1.0, expected)
+            largest, range_ = (np.inf, "≥ 0") if self.wears else (1.0, "from 0 to 1")
+            expected = f"a number {range_} for each named edge"
+            _check_numbers("sharpness", self.sharpness, self.named, largest, expected)
         if self.vertices is not None:
             object.__setattr__(self, "vertices", as_vertices(self.vertices))
         if self.vertex_sharpness is not None:
@@ -78,14 +84,15 @@ class Creases:
             raise ParameterError("border", self.border, expected=", ".join(BORDERS))
 
     def with_named(self, pairs: Integer[np.ndarray, "N 2"]) -> Creases:
-        """Return a copy with further pairs of vertices named, of sharpness 1."""
+        """Return a copy with further pairs of vertices named, as sharp as any may be."""
         if len(pairs) == 0:
             return self
         if self.named is None:
             return replace(self, named=pairs)
         sharpness = self.sharpness
         if sharpness is not None:
-            sharpness = np.concatenate([np.ones(len(pairs)), sharpness])
+            most = np.full(len(pairs), np.inf if self.wears else 1.0)
+            sharpness = np.concatenate([most, sharpness])
         return replace(self, named=np.concatenate([pairs, self.named]), sharpness=sharpness)
 
     @property
@@ -93,12 +100,13 @@ class Creases:
         """Tell whether edges are found by their shape."""
         return self.learned or self.angle is not None
 
-    @property
-    def sharp_pairs(self) -> Integer[np.ndarray, "N 2"] | None:
-        """The named edges that count as sharp: those of sharpness above ½."""
-        if self.named is None or self.sharpness is None:
+    def sharp_pairs(self, depth: int = 0) -> Integer[np.ndarray, "N 2"] | None:
+        """Return the named edges that count as sharp at a level: those of sharpness above ½."""
+        if self.named is None or not (self.wears or self.sharp_at(depth)):
+            return None
+        if self.sharpness is None:
             return self.named
-        return self.named[self.sharpness > MOSTLY_SHARP]
+        return self.named[self.sharpness - (depth if self.wears else 0) > MOSTLY_SHARP]
 
     def sharp_at(self, depth: int) -> bool:
         """Return whether the edges are sharp at a level; level 0 refines the control mesh."""
@@ -150,7 +158,7 @@ class Creases:
             return topology.with_creases(rows)
         sharpness = np.zeros(len(topology.edges))
         np.maximum.at(sharpness, rows, self.sharpness)
-        return topology.with_sharpness(sharpness)
+        return topology.with_wear(sharpness) if self.wears else topology.with_sharpness(sharpness)
 
     def found(
         self,
@@ -170,18 +178,39 @@ NO_CREASES = Creases()
 
 
 def chosen_creases(
-    given: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None, automatic: Creases
+    given: Integer[np.ndarray, "N 2"] | Creases | str | None, automatic: Creases
 ) -> Creases:
     """Return the creases that an argument asks for; "auto": those of the scheme.
 
+    "off" and None are no creases; "angle:40" is edges that turn by more than 40 degrees.
+
     Raises:
-        ParameterError: another word, or no pairs of whole numbers.
+        ParameterError: another word, an angle out of range, or no pairs of whole numbers.
     """
     if isinstance(given, str):
-        if given != "auto":
-            raise ParameterError("creases", given, expected='"auto", None or pairs of vertices')
-        return automatic
+        if given in ("auto", "off"):
+            return automatic if given == "auto" else NO_CREASES
+        if (found := _ANGLE.fullmatch(given)) is None:
+            expected = '"auto", "off", "angle:" and degrees, None, or pairs of vertices'
+            raise ParameterError("creases", given, expected=expected)
+        return Creases(angle=float(found[1]))
     return given if isinstance(given, Creases) else Creases(given)
+
+
+def one_of_creases(
+    creases: Integer[np.ndarray, "N 2"] | Creases | str | None,
+    crease: Integer[np.ndarray, "N 2"] | Creases | str | None,
+) -> Integer[np.ndarray, "N 2"] | Creases | str | None:
+    """Return the one of two names of an argument that is given; "auto" without any.
+
+    Raises:
+        ParameterError: both are.
+    """
+    if isinstance(crease, str) and crease == "auto":
+        return creases
+    if not (isinstance(creases, str) and creases == "auto"):
+        raise ParameterError("crease", crease, expected="no other value than that of creases")
+    return crease
 
 
 def edge_cosines(

@@ -73,6 +73,8 @@ class Topology:
         vertex_sharpness: (V,) at how many more levels each vertex is a corner, infinity for good,
             its last part in part; (0,) where none is.
         plain: no face names a vertex twice, and no two triangles have the same vertices.
+        wear: (E,) at how many more levels each edge that wears off is sharp, infinity for good, its
+            last part in part; (0,) where none does.
         soft_corners: (V,) learned corner weight κ in [0, 1] of each vertex, which lasts as long as
             the sharpness of edges; (0,) where it is 0 at all.
     """
@@ -89,6 +91,7 @@ class Topology:
     vertex_sharpness: Float[np.ndarray, " K"]
     plain: bool
     soft_corners: Float[np.ndarray, " SV"] = field(default_factory=lambda: NO_WEIGHTS)
+    wear: Float[np.ndarray, " W"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -245,6 +248,31 @@ class Topology:
             soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
         return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
 
+    def with_wear(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
+        """Return a copy whose interior edges are sharp for so many levels, infinity for good."""
+        made = self.with_sharpness(np.minimum(sharpness, 1.0))
+        wear = np.where(self.edge_class == kernels.INTERIOR, sharpness, 0.0)
+        return replace(made, wear=wear if wear.any() else NO_WEIGHTS)
+
+    def worn(self, parent: Topology, halves: Integer[np.ndarray, "E 2"] | None = None) -> Topology:
+        """Return the copy of a split in which edges that wear off are a level less sharp.
+
+        ``halves`` are the edges that each edge of the parent was split into, if they are known.
+        """
+        if len(parent.wear) == 0:
+            return self
+        rows = np.flatnonzero(parent.wear)
+        if halves is None:
+            own = self.rows_of(halves_of(parent, rows)).reshape(-1, 2)
+        else:
+            own = halves[rows].astype(np.int64)
+        classes, soft, left = self.edge_class.copy(), self.soft.copy(), np.zeros(len(self.edges))
+        classes[own] = kernels.INTERIOR
+        if len(soft):
+            soft[own] = 0.0
+        left[own] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
+        return replace(self, edge_class=classes, soft=soft).with_wear(left)
+
     def with_border(self, rule: str) -> Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
         if rule == "smooth":
@@ -288,7 +316,8 @@ class Topology:
     def without_creases(self) -> Topology:
         """Return a copy without creases, soft edges and corners."""
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
-        none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
+        kinds = "soft", "vertex_sharpness", "soft_corners", "wear"
+        none = dict.fromkeys(kinds, NO_WEIGHTS)
         return replace(self, edge_class=classes.astype(np.int8), **none)
 
     def without_soft(self) -> Topology:
@@ -396,7 +425,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return inheriting(made, parent) if inherit else made
+        return (inheriting(made, parent) if inherit else made).worn(parent)
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
     face_count, edge_count = parent.face_count, len(parent.edges)
@@ -418,7 +447,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     if inherit and len(soft):
         child_soft = np.zeros(count)
         child_soft[halves] = soft[:, None]
-    return Topology(
+    made = Topology(
         vertex_count,
         faces.reshape(-1),
         np.arange(0, faces.size + 1, TRIANGLE, dtype=np.int32),
@@ -432,6 +461,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         plain=True,
         soft_corners=soft_corners,
     )
+    return made.worn(parent, halves)
 
 
 def inheriting(made: Topology, parent: Topology) -> Topology:

@@ -90,6 +90,11 @@ def creases_by_name(mesh: Mesh, creases: Creases, scheme: Scheme) -> Creases:
     topology = with_sharp_edges(level, creases, scheme).topology
     found = np.concatenate([topology.crease_edges, np.flatnonzero(topology.soft)])
     sharpness = topology.sharpness[found] if len(topology.soft) else None
+    if creases.wears:
+        # Edges that are found stay as sharp as they are.
+        wear = topology.wear[found] if len(topology.wear) else np.zeros(len(found))
+        lasting = np.where(topology.sharpness[found] < 1, topology.sharpness[found], np.inf)
+        sharpness = np.where(wear > 0, wear, lasting)
     edges = topology.edges[found].astype(np.int64)
     corners = None
     if creases.learned and isinstance(scheme.rule, DirectedRule):
@@ -118,6 +123,6 @@ def sharp_edges(
         scheme = loop() if angle is not None else pns(load_model())
     creases = scheme.creases if angle is None else Creases(angle=angle)
     named = creases_by_name(mesh, creases, scheme)
-    pairs = named.sharp_pairs
+    pairs = named.sharp_pairs()
     assert pairs is not None
     return pairs

@@ -25,6 +25,9 @@ SURFACES = (TRIANGLES, STRIP, FAN)
 # Says which successive triangles are one polygon: those that begin with one vertex.
 NGONS = "FB_ngon_encoding"
 
+# Pairs of vertices, between which viewers draw lines.
+OUTLINE = "CESIUM_primitive_outline"
+
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 # The magic word of a GLB is bodies.media.GLB_MAGIC.

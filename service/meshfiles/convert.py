@@ -23,7 +23,7 @@ from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
-from ..bodies.sibling_files import ALONE, SiblingFiles, folder_of
+from ..bodies.sibling_files import ALONE, Opened, SiblingFiles, folder_of
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, read_upload
@@ -31,10 +31,12 @@ from ..gltf.subdivide import make_scheme, polygon_scheme, refine_scene, subdivid
 from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import MAX_LEVELS, Limits, Options
 from ..report import Change, changes_of, hint_on
+from .companions import companions, copied
 from .flatten import Surface, flatten
 from .formats import FORMATS, held, read_within
 from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
+from .mtl import nearby
 from .parts import with_group_normals
 from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
 from .triangulate import in_star_shaped_pieces, triangulated
@@ -137,6 +139,8 @@ def _convert_one(
         sys.stdout.buffer.flush()
     else:
         replace_file(job.output, written.content)
+        copies = _copies(job, data, siblings, force=jobs.force)
+        written = replace(written, report=with_changes(written.report, copies))
     if jobs.map is not None:
         file = BytesIO()
         np.savez_compressed(file, allow_pickle=False, **written.parents)
@@ -148,12 +152,30 @@ def _convert_one(
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     name = "stdout" if job.output == STREAM else job.output
-    made, triangles = f"{written.faces:,} faces", written.triangles
-    made += f", {triangles:,} triangles," if triangles != written.faces else ""
+    # What formats of triangles hold; a file of quads alone is counted in its faces.
+    polygons = written.triangles != written.faces and job.target not in (*GLTF_KINDS, "stl")
+    count, what = (written.faces, "faces") if polygons else (written.triangles, "triangles")
     more = ""
     if options.levels < MAX_LEVELS and not options.selects:
-        more = f"; --levels {options.levels + 1} would give {4 * triangles:,} triangles"
-    console.print(f"{name}: {made} in {seconds:.1f} s{more}", markup=False)
+        more = f"; --levels {options.levels + 1} would give {4 * count:,}"
+    console.print(f"{name}: {count:,} {what} in {seconds:.1f} s{more}", markup=False)
+
+
+def _copies(job: _Job, data: bytes, siblings: SiblingFiles, *, force: bool) -> list[Change]:
+    """Copy the materials and textures of a mesh file beside its result in another folder."""
+    folder = job.output.parent
+    alone = job.source == STREAM or job.kind != job.target
+    if alone or folder.resolve() == job.source.parent.resolve():
+        return []
+
+    def read(name: str) -> bytes | None:
+        return (folder / name).read_bytes() if (folder / name).is_file() else None
+
+    def write(name: str, content: bytes) -> None:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        replace_file(folder / name, content)
+
+    return copied(companions(data, job.kind, Opened(siblings)), read, write, force=force)
 
 
 def _planned(jobs: Jobs, options: Options) -> list[_Job]:
@@ -257,10 +279,11 @@ def converted(
             written = _of_gltf(glb, report, target, limits)
             written = replace(written, triangles=_triangles_of(refined))
         else:
-            kept, changes = held(refined, target)
+            near = nearby(refined.libraries, Opened(siblings))
+            kept, changes = held(replace(refined, libraries=near), target)
             written = Written(
                 FORMATS[target].write(kept),
-                _with_changes(report, changes),
+                with_changes(report, changes),
                 len(kept.sizes),
                 _triangles_of(kept),
                 parents=_map_of(kept, target),
@@ -406,12 +429,13 @@ def _flattened(
         kept, also_lost = held(mesh, target)
         content = FORMATS[target].write(kept)
     # A mesh that several nodes show is there several times.
-    report = _with_changes(scene.report, [*changes, *lost, *also_lost])
+    report = with_changes(scene.report, [*changes, *lost, *also_lost])
     faces = len(kept.sizes)
     return Written(content, report, faces, faces, course.seconds, scene.faces_in)
 
 
-def _with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
+def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
+    """Return a report that tells of more changes."""
     return report | changes_of([*(Change(**each) for each in report["changes"]), *changes])
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int, Shaped
 from pns_common.mesh.rows import disjoint_faces, unit
 
 from ..errors import GltfError, UnrefinableError, check_limit
-from ..gltf.constants import FLOAT, SURFACES, TRIANGLES
+from ..gltf.constants import FLOAT, OUTLINE, SURFACES, TRIANGLES
 from ..gltf.read.accessors import as_float, read
 from ..gltf.read.extensions import INSTANCING
 from ..gltf.read.primitives import TrianglePrimitive
@@ -365,6 +365,7 @@ def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
             ("/materials", named, len(tree.get("materials", []))),
             ("/meshes", "morph targets", _count_targets(tree)),
             ("/meshes", "points and lines", _count_other_modes(tree)),
+            ("/meshes", "outlines", _count_outlines(tree)),
         )
         if count
     ]
@@ -396,6 +397,11 @@ def _count_targets(tree: dict[str, Any]) -> int:
         )
         for mesh in tree.get("meshes", [])
     )
+
+
+def _count_outlines(tree: dict[str, Any]) -> int:
+    primitives = (p for mesh in tree.get("meshes", []) for p in mesh.get("primitives", []))
+    return sum(OUTLINE in primitive.get("extensions", {}) for primitive in primitives)
 
 
 def _count_other_modes(tree: dict[str, Any]) -> int:

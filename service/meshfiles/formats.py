@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pns_common.mesh.mesh import fans, repeated_vertex
-from pns_common.mesh.rows import distinct_rows, marked
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.rows import marked
 
 from ..errors import UnreadableError, UnrefinableError
 from ..gltf.read.plan import check_memory
 from ..gltf.refine.changes import STEPS, faces_too_far
-from ..meshes.weld import canonical_zero
 from ..options import Limits
 from ..report import Change
 from .mesh_file import (
@@ -30,7 +29,7 @@ from .mesh_file import (
     shown,
 )
 from .obj import read_obj, write_obj
-from .off import read_off, write_off
+from .off import is_binary, read_off, write_off
 from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
@@ -72,6 +71,7 @@ FORMATS = {
     "off": Format(
         read_off,
         write_off,
+        bytes_per_byte=60,
         layers=frozenset({UV, NORMAL, COLOUR}),
         vertex_layers=None,
         face_values=frozenset({COLOUR}),
@@ -89,8 +89,9 @@ def memory_to_read(data: bytes, kind: str) -> int:
 
     A text takes them by its letters, its lines and its words, measured on the shortest of each.
     """
-    binary = (kind == "stl" and not is_text(data)) or (kind == "ply" and b"ascii" not in data[:200])
-    if binary:
+    binary = {"stl": lambda: not is_text(data), "ply": lambda: b"ascii" not in data[:200]}
+    binary["off"] = lambda: is_binary(data)
+    if kind in binary and binary[kind]():
         return FORMATS[kind].bytes_per_byte * len(data)
     lines = data.count(b"\n") + data.count(b"\r")
     return 8 * len(data) + 170 * lines + 130 * count_words(data)
@@ -165,7 +166,9 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         # An OBJ names values corner by corner, but for colours.
         and ((layer.rows >= 0).all() or (kind == "obj" and name != COLOUR))
     }
-    lost |= {shown(name): 1 for name in mesh.layers.keys() - layers.keys()}
+    for name in mesh.layers.keys() - layers.keys():
+        partly = form.layers is None or name in form.layers
+        lost[shown(name) + " that not all corners have" * partly] = 1
     if kind == "obj" and COLOUR in layers:
         colours = as_fractions(layers[COLOUR].values)
         if (colours[:, 3:] < 1).any():
@@ -183,9 +186,12 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     lost |= {
         f"{name}s": len(mesh.labels[name].names) for name in mesh.labels.keys() - labels.keys()
     }
-    changes = [Change("", what + why, count) for what, count in sorted(lost.items())]
     libraries = mesh.libraries if MATERIAL in form.labels else ()
-    mesh = replace(mesh, layers=layers, face_values=values, labels=labels, libraries=libraries)
+    textures = mesh.textures if kind == "ply" else ()
+    lost["names of textures"] = len(mesh.textures) - len(textures)
+    changes = [Change("", what + why, count) for what, count in sorted(lost.items()) if count]
+    held = replace(mesh, layers=layers, face_values=values, labels=labels)
+    mesh = replace(held, libraries=libraries, textures=textures)
     names = form.vertex_layers
     mesh = with_vertex_layers(mesh, [*layers] if names is None else [*names])
     if not (form.double or (kind == "ply" and mesh.double)):
@@ -219,4 +225,5 @@ def _without_area(
     vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
 ) -> Bool[np.ndarray, " F"]:
     """Return which faces have two corners in one place."""
-    return repeated_vertex(distinct_rows(canonical_zero(vertices))[faces])
+    a, b, c = (vertices[column] for column in faces.T)
+    return (a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1)

@@ -26,9 +26,9 @@ from ..gltf.write.writer import Writer
 from ..options import Limits, Options
 from ..report import Change
 from .formats import rounding_changes
-from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Layer, MeshFile
-from .mtl import PLAIN, WHITE, library_files, materials_of
-from .parts import Part, parts_of
+from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Labels, Layer, MeshFile
+from .mtl import PLAIN, WHITE, library_files, materials_of, textured
+from .parts import Part, kinds_of, parts_of
 from .triangulate import triangulated
 
 _SHAPES: tuple[Literal["SCALAR", "VEC2", "VEC3", "VEC4"], ...] = ("SCALAR", "VEC2", "VEC3", "VEC4")
@@ -53,13 +53,25 @@ def as_glb(
     Raises:
         UnrefinableError: a position that float32 cannot hold.
     """
-    changes = rounding_changes(mesh)
+    changes, opened = rounding_changes(mesh), Opened(siblings)
+    if mesh.textures and UV not in mesh.layers:
+        what = "names of textures dropped: there are no texture coordinates"
+        changes.append(Change("", what, len(mesh.textures)))
+    mesh = _with_textures(mesh)
     mesh, lost = _with_colours_at_corners(mesh)
     changes += lost
     quads = bool((mesh.sizes == 4).all())
     parts, incomplete = parts_of(_as_triangles(mesh) if quads else triangulated(mesh))
-    opened, labels = Opened(siblings), mesh.labels.get(MATERIAL)
-    made = materials_of(() if labels is None else labels.names, mesh.libraries, opened)
+    labels = mesh.labels.get(MATERIAL)
+    names = () if labels is None else labels.names
+    if mesh.textures:
+        made = textured(names, opened)
+    else:
+        made = materials_of(names, mesh.libraries, mesh.encoding, opened)
+    changes += [
+        Change("", f"{keyword} of materials dropped: not written to GLB files", count)
+        for keyword, count in made.lost.items()
+    ]
     changes += incomplete + [
         Change("", f"materials not found: no {name} came with the file", 1)
         for name in mesh.libraries
@@ -198,15 +210,27 @@ def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
     return replace(mesh, layers={**mesh.layers, COLOUR: Layer(colours, rows)}), changes
 
 
+def _with_textures(mesh: MeshFile) -> MeshFile:
+    """Return a mesh with materials by the numbers of its textures, as MeshLab writes them.
+
+    It names no texture if it has no texture coordinates, or no number.
+    """
+    if not mesh.textures or UV not in mesh.layers:
+        return replace(mesh, textures=())
+    of_face, values = np.zeros(len(mesh.sizes), dtype=np.int64), dict(mesh.face_values)
+    if (own := values.pop("texnumber", None)) is not None:
+        of_face = own[:, 0].astype(np.int64)
+        of_face[(of_face < 0) | (of_face >= len(mesh.textures))] = NONE
+    labels = {**mesh.labels, MATERIAL: Labels(mesh.textures, of_face)}
+    return replace(mesh, face_values=values, labels=labels)
+
+
 def _as_triangles(mesh: MeshFile) -> MeshFile:
-    """Return quads as triangles, those of a material together, as FB_ngon_encoding asks for.
+    """Return quads as triangles, those of a primitive together, as FB_ngon_encoding asks for.
 
     Triangles of one quad begin with one vertex, and those of the next with another.
     """
-    materials = mesh.labels.get(MATERIAL)
-    order = np.arange(len(mesh.sizes))
-    if materials is not None:
-        order = np.argsort(materials.of_face, kind="stable")
+    order = np.argsort(kinds_of(mesh), kind="stable")
     begin = _beginnings(mesh.corners.reshape(-1, 4)[order])
     places = (4 * order[:, None] + FANS[begin]).reshape(-1)
     return mesh.cut(places.reshape(-1, 3), np.repeat(order, 2))

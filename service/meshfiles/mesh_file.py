@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ..report import Change
+from .tags import Tags
 
 # Layers are called as glTF calls attributes; other properties begin with an underscore.
 UV, NORMAL, COLOUR = "TEXCOORD_0", "NORMAL", "COLOR_0"
@@ -56,9 +57,12 @@ class MeshFile:
         layers: values at corners by name; texture coordinates count v upwards.
         face_values: (F, K) values of faces, by name.
         labels: names of faces, by what they name.
-        libraries: files that define the materials.
+        libraries: files that define the materials, as the file spells them.
+        textures: images that a PLY names, likewise.
+        encoding: of the names above, and of those in labels.
         double: whether a format that has both is to store positions as doubles.
         changes: what the reader dropped or mended.
+        tags: creases that the file states; None: it states none.
         parents: of a refined mesh, the vertices of the file that each vertex is made of.
     """
 
@@ -69,8 +73,11 @@ class MeshFile:
     face_values: dict[str, Shaped[np.ndarray, "F K"]] = field(default_factory=dict)
     labels: dict[str, Labels] = field(default_factory=dict)
     libraries: tuple[str, ...] = ()
+    textures: tuple[str, ...] = ()
+    encoding: str = "utf-8"
     double: bool = False
     changes: tuple[Change, ...] = ()
+    tags: Tags | None = None
     parents: SubdivisionMatrix | None = None
 
     @property

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import quote
 
-from ..bodies.sibling_files import File, Opened, SiblingFiles
-from .text import is_number, name_of, plain_text
+from ..bodies.sibling_files import File, Opened
+from .text import is_number, name_of, named, plain_text
 
 # glTF's own default is a bare metal, which is black where nothing surrounds it.
 PLAIN = {
@@ -23,16 +26,19 @@ _OPTIONS = {
     b"-texres": 1, b"-clamp": 1, b"-bm": 1, b"-imfchan": 1, b"-type": 1,
 }  # fmt: skip
 _LIBRARY = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^\n]*)")
-_MAPS = (b"map_kd", b"map_ke", b"norm")
+_MAP = re.compile(rb"map_\w+|norm|bump|disp|decal|refl")
+_WRITTEN = frozenset({b"map_kd", b"map_ke", b"norm"})
 _NUMBERS = frozenset({b"-o", b"-s", b"-t", b"-mm"})
+_ABSOLUTE = re.compile(r"[A-Za-z]:|/")
 
 
 @dataclass
 class Materials:
-    """Materials in glTF's words, and the images that their textures name by URI."""
+    """Materials in glTF's words, the images that their textures name by URI, and what is lost."""
 
     entries: list[dict[str, Any]] = field(default_factory=list)
     images: list[str] = field(default_factory=list)
+    lost: Counter[str] = field(default_factory=Counter)
 
     def texture(self, uri: str) -> dict[str, int]:
         """Return a reference to the texture of an image, one for each image."""
@@ -41,38 +47,101 @@ class Materials:
         return {"index": self.images.index(uri)}
 
 
-def materials_of(names: Iterable[str], libraries: Iterable[str], opened: Opened) -> Materials:
+@dataclass(frozen=True)
+class _Definition:
+    """The statements of a material by keyword, and the folder of its library."""
+
+    properties: dict[bytes, bytes]
+    folder: str
+
+
+def found(path: str, folders: Sequence[str], opened: Opened) -> File | None:
+    """Open a file that a document names: from one of some folders, else by its name alone there.
+
+    The paths of other machines, and the folders of Windows, lead to what came along.
+    """
+    path = path.replace("\\", "/")
+    ways = [posixpath.basename(path)]
+    if _ABSOLUTE.match(path) is None:
+        ways.insert(0, path)
+    for way in ways:
+        for folder in folders:
+            place = posixpath.normpath(posixpath.join(folder, way))
+            # As it is spelled, and as a URI.
+            for uri in dict.fromkeys((quote(place), place)):
+                if (file := opened.open(uri)) is not None:
+                    return file
+    return None
+
+
+def materials_of(
+    names: Iterable[str], libraries: Iterable[str], encoding: str, opened: Opened
+) -> Materials:
     """Return a glTF material for each name, as the first library that has it defines it."""
-    defined: dict[str, dict[bytes, bytes]] = {}
-    for library in libraries:
-        for file in library_files(library, opened):
-            for name, properties in _definitions(bytes(file.content)):
-                defined.setdefault(name, properties)
-    made = Materials()
-    made.entries = [_material(name, defined.get(name, {}), made) for name in names]
+    by_bytes, by_name = dict[bytes, _Definition](), dict[str, _Definition]()
+    for file in (file for library in libraries for file in library_files(library, opened)):
+        folder = posixpath.dirname(file.name)
+        for name, properties in _definitions(bytes(file.content)):
+            by_bytes.setdefault(name, _Definition(properties, folder))
+            by_name.setdefault(name_of(name), by_bytes[name])
+    made, none = Materials(), _Definition({}, "")
+    for name in names:
+        own = by_bytes.get(name.encode(encoding)) or by_name.get(name, none)
+        made.entries.append(_material(name, own, made, opened))
+        made.lost.update(
+            keyword.decode("latin-1")
+            for keyword in own.properties
+            if _MAP.fullmatch(keyword) and keyword not in _WRITTEN
+        )
     return made
 
 
-def named_files(data: bytes, siblings: SiblingFiles) -> list[str]:
-    """Return the libraries that an OBJ names, and the images that these name."""
-    opened, names = Opened(siblings), list[str]()
-    for found in _LIBRARY.findall(plain_text(data)) if b"mtllib" in data else ():
-        for file in library_files(name_of(found), opened):
-            names.append(file.name)
-            for _, properties in _definitions(bytes(file.content)):
-                maps = (_image(properties.get(keyword)) for keyword in _MAPS)
-                names += [name for name in maps if name is not None]
-    return list(dict.fromkeys(names))
+def textured(images: Iterable[str], opened: Opened) -> Materials:
+    """Return a material for each image, which shows it as it is."""
+    made = Materials()
+    for name in images:
+        texture = {"baseColorTexture": made.texture(_uri(name, ("",), opened))}
+        surface = PLAIN | {"baseColorFactor": WHITE} | texture
+        made.entries.append({"name": name, "pbrMetallicRoughness": surface})
+    return made
+
+
+def files_of_obj(data: bytes, opened: Opened) -> list[File]:
+    """Return the libraries that an OBJ names, and the images that these name, of what came."""
+    files: list[File | None] = []
+    for name in _LIBRARY.findall(plain_text(data)) if b"mtllib" in data else ():
+        for library in library_files(name_of(name), opened):
+            folder = posixpath.dirname(library.name)
+            files.append(library)
+            for _, properties in _definitions(bytes(library.content)):
+                files += [
+                    found(image, (folder, ""), opened)
+                    for keyword, text in properties.items()
+                    if _MAP.fullmatch(keyword) and (image := _image(text))
+                ]
+    return list({file.name: file for file in files if file is not None}.values())
 
 
 def library_files(library: str, opened: Opened) -> list[File]:
     """Open what a `mtllib` statement names: one file whose name may have blanks, or several."""
-    whole = opened.open(library) or opened.open(library.strip('"'))
-    found = [whole] if whole is not None else [opened.open(name) for name in library.split()]
-    return [file for file in found if file is not None]
+    whole = found(library.strip('"'), ("",), opened)
+    several = [whole] if whole else [found(name, ("",), opened) for name in library.split()]
+    return [file for file in several if file is not None]
 
 
-def _definitions(data: bytes) -> Iterator[tuple[str, dict[bytes, bytes]]]:
+def nearby(libraries: Iterable[str], opened: Opened) -> tuple[str, ...]:
+    """Return names of libraries, those that came along as paths that lead to them here."""
+    names: list[str] = []
+    for library in libraries:
+        path = library.strip('"').replace("\\", "/")
+        there = found(path, ("",), opened)
+        if there is not None and posixpath.normpath(path) != there.name:
+            path = posixpath.basename(path)
+        names.append(library if there is None else path)
+    return tuple(names)
+
+
+def _definitions(data: bytes) -> Iterator[tuple[bytes, dict[bytes, bytes]]]:
     """Yield each material's name and its statements by keyword."""
     name, properties = None, dict[bytes, bytes]()
     for line in plain_text(data).split(b"\n"):
@@ -80,24 +149,30 @@ def _definitions(data: bytes) -> Iterator[tuple[str, dict[bytes, bytes]]]:
         if keyword.lower() == b"newmtl":
             if name is not None:
                 yield name, properties
-            name, properties = name_of(rest), {}
+            name, properties = named(rest), {}
         elif keyword:
             properties[keyword.lower()] = rest.strip()
     if name is not None:
         yield name, properties
 
 
-def _material(name: str, given: dict[bytes, bytes], made: Materials) -> dict[str, Any]:
+def _material(name: str, own: _Definition, made: Materials, opened: Opened) -> dict[str, Any]:
     surface: dict[str, Any] = dict(PLAIN)
     material: dict[str, Any] = {"name": name, "pbrMetallicRoughness": surface}
+    given = own.properties
+    textures = {
+        keyword: made.texture(_uri(image, (own.folder, ""), opened))
+        for keyword in (b"map_kd", b"map_ke", b"norm")
+        if (image := _image(given.get(keyword)))
+    }
     colour = _numbers(given.get(b"kd"), 3)
     opacity = (
         _numbers(given.get(b"d"), 1) or [1 - t for t in _numbers(given.get(b"tr"), 1)] or [1.0]
     )
     if colour or b"map_kd" in given:
         surface["baseColorFactor"] = [*(colour or WHITE[:3]), 1.0]
-    if image := _image(given.get(b"map_kd")):
-        surface["baseColorTexture"] = made.texture(image)
+    if b"map_kd" in textures:
+        surface["baseColorTexture"] = textures[b"map_kd"]
     if opacity[0] < 1:
         surface["baseColorFactor"] = [*surface["baseColorFactor"][:3], opacity[0]]
         material["alphaMode"] = "BLEND"
@@ -109,12 +184,20 @@ def _material(name: str, given: dict[bytes, bytes], made: Materials) -> dict[str
             surface[factor] = value[0]
     if glow := _numbers(given.get(b"ke"), 3):
         material["emissiveFactor"] = glow
-    if image := _image(given.get(b"map_ke")):
-        material["emissiveTexture"] = made.texture(image)
+    if b"map_ke" in textures:
+        material["emissiveTexture"] = textures[b"map_ke"]
         material.setdefault("emissiveFactor", WHITE[:3])
-    if image := _image(given.get(b"norm")):
-        material["normalTexture"] = made.texture(image)
+    if b"norm" in textures:
+        material["normalTexture"] = textures[b"norm"]
     return material
+
+
+def _uri(image: str, folders: Sequence[str], opened: Opened) -> str:
+    """Return the URI of an image that came along; of one of another machine its name alone."""
+    path = image.replace("\\", "/")
+    if (file := found(path, folders, opened)) is not None:
+        path = file.name
+    return quote(path if _ABSOLUTE.match(path) is None else posixpath.basename(path))
 
 
 def _numbers(text: bytes | None, count: int) -> list[float]:
@@ -135,4 +218,4 @@ def _image(text: bytes | None) -> str | None:
         for _ in range(_OPTIONS[option]):
             if words and (option not in _NUMBERS or is_number(words[0])):
                 words.pop(0)
-    return name_of(b" ".join(words)).strip('"').replace("\\", "/") or None
+    return name_of(b" ".join(words)).strip('"') or None

@@ -31,10 +31,22 @@ from .mesh_file import (
     dropped,
     offsets_of,
 )
-from .text import BLOCK, NUMBER, Text, cut_text, name_of, parsed, plain_text, rows_text
+from .tags import Tags
+from .text import (
+    BLOCK,
+    NUMBER,
+    Text,
+    cut_text,
+    encoding_of,
+    named,
+    parsed,
+    plain_text,
+    rows_text,
+    whole_rows,
+)
 
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
-_LIBRARY = b"mtllib"
+_LIBRARY, _TAG = b"mtllib", b"t"
 _DROPPED = {
     b"l": "lines",
     b"p": "points",
@@ -46,6 +58,7 @@ _DROPPED = {
 (_SLASH,) = b"/"
 # Colours as ZBrush writes them.
 _PAINT = re.compile(rb"(?m)^#MRGB[ \t]+([0-9A-Fa-f]+)")
+_CONTINUED = re.compile(rb"(\\)([ \t]+)(?=\n)")
 _REFERENCES = re.compile(rb"[+-]?\d+(?:/(?:[+-]?\d+)?){0,2}")
 
 
@@ -56,6 +69,9 @@ def read_obj(data: bytes) -> MeshFile:
         UnreadableError: a position or a face cannot be read, or names a vertex that there is not.
     """
     data = plain_text(data)
+    if b"\\" in data:
+        # Blanks behind a backslash, as editors leave them.
+        data = _CONTINUED.sub(rb"\2\1", data)
     text = cut_text(data, "OBJ", continued=True)
     is_v, is_vt, is_vn = (text.keyword(word) for word in (b"v", b"vt", b"vn"))
     is_face = text.keyword(b"f") | text.keyword(b"fo")
@@ -73,7 +89,7 @@ def read_obj(data: bytes) -> MeshFile:
         why = "they count from 1" if name == 0 else f"there are {there}"
         raise text.fault(face, f"a face names vertex {name}, and {why}")
     lost: Counter[str] = Counter()
-    layers = _layers(text, (is_vt, vt), (is_vn, vn), lost)
+    layers = _layers(text, (is_vt, vt), (is_vn, vn), sizes, lost)
     painted = b"".join(_PAINT.findall(data)) if b"#MRGB" in data else b""
     if len(painted) == 8 * len(vertices):
         # Of each vertex a mask, and three bytes of its colour.
@@ -82,7 +98,9 @@ def read_obj(data: bytes) -> MeshFile:
         lost["colours that not all vertices have"] += 1
     if colours is not None:
         layers[COLOUR] = Layer(colours, v)
-    labels, libraries = _statements(text, data, ~(is_v | is_vt | is_vn | is_face), line, lost)
+    others = ~(is_v | is_vt | is_vn | is_face)
+    tags = _tags(text, others, lost)
+    labels, libraries, encoding = _statements(text, data, others, line, lost)
     return MeshFile(
         vertices,
         offsets_of(sizes),
@@ -90,6 +108,8 @@ def read_obj(data: bytes) -> MeshFile:
         layers,
         labels=labels,
         libraries=libraries,
+        encoding=encoding,
+        tags=tags,
         changes=dropped(lost),
     )
 
@@ -129,14 +149,20 @@ def _references(
         references[:, 0] = text.numbers(words, np.int64)
         return references, sizes
     blank = letters <= ord(" ")
-    slashes = np.searchsorted(
-        np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
-    )
-    counts = 1 + np.diff(slashes, prepend=0)
+    at, ends = np.flatnonzero(letters == _SLASH), np.flatnonzero(blank)[: len(words)]
     corners = np.where(blank, np.uint8(ord(" ")), letters).tobytes()
     # What is left out is 0.
     corners = corners.replace(b"//", b"/0/").replace(b"/ ", b"/0 ").replace(b"/", b" ")
     values = parsed(corners, np.int64)
+    each, rest = divmod(len(at), len(words))
+    if not rest and each < 3 and len(values) == (1 + each) * len(words):
+        at = at.reshape(len(words), each)
+        # As many slashes in every word, as nearly all files have.
+        if (at[:, -1] < ends).all() and (at[1:, 0] > ends[:-1]).all():
+            references = np.zeros((len(words), 3), dtype=np.int64)
+            references[:, : 1 + each] = values.reshape(len(words), -1)
+            return references, sizes
+    counts = 1 + np.diff(np.searchsorted(at.reshape(-1), ends), prepend=0)
     if counts.max() > 3 or len(values) != counts.sum():
         bad = next((w for w in words.tolist() if not _REFERENCES.fullmatch(text.word(w))), 0)
         raise text.word_fault(bad, "no corner of a face")
@@ -159,9 +185,13 @@ def _layers(
     text: Text,
     uv: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
     normals: tuple[Bool[np.ndarray, " L"], Int[np.ndarray, " C"]],
+    sizes: Int[np.ndarray, " F"],
     lost: Counter[str],
 ) -> dict[str, Layer]:
-    """Read what corners name beside positions; what cannot be read is dropped."""
+    """Read what corners name beside positions; what cannot be read is dropped.
+
+    A face has values at all of its corners or at none.
+    """
     layers: dict[str, Layer] = {}
     kinds = {
         UV: (*uv, 2, 1, "texture coordinates"),
@@ -178,6 +208,10 @@ def _layers(
             why = " that cannot be read" if named.any() else " that no face names"
             lost[shown + why] = count
             continue
+        missing = np.bincount(np.repeat(np.arange(len(sizes)), sizes)[~named], minlength=len(sizes))
+        partly = (missing > 0) & (missing < sizes)
+        lost[f"{shown} of faces of which not all corners have some"] += int(partly.sum())
+        named &= np.repeat(missing == 0, sizes)
         layers[name] = Layer(values, np.where(named, rows, NONE))
     return layers
 
@@ -205,44 +239,54 @@ def _rows(
     return rows
 
 
+def _tags(text: Text, others: Bool[np.ndarray, " L"], lost: Counter[str]) -> Tags | None:
+    """Return what OpenSubdiv's tags state; None without any that is understood."""
+    tags = Tags()
+    for line in np.flatnonzero(others & text.keyword(_TAG)).tolist():
+        first = text.first[line]
+        tags.read([text.word(first + k) for k in range(1, text.counts[line])], lost)
+    return tags if tags.edges or tags.vertices or tags.border else None
+
+
 def _statements(
     text: Text,
     data: bytes,
     others: Bool[np.ndarray, " L"],
     face_lines: Int[np.ndarray, " F"],
     lost: Counter[str],
-) -> tuple[dict[str, Labels], tuple[str, ...]]:
-    """Return the names that statements give to the faces below them, and the libraries.
+) -> tuple[dict[str, Labels], tuple[str, ...], str]:
+    """Return the names that statements give to the faces below them, the libraries, the encoding.
 
     `data` has the comments that are blank in the text. Other statements are counted as lost.
     """
     known = {word: kind for kind, word in STATEMENTS.items()}
-    given: dict[str, list[tuple[int, str]]] = {kind: [] for kind in known.values()}
-    libraries: list[str] = []
+    given: dict[str, list[tuple[int, bytes]]] = {kind: [] for kind in known.values()}
+    libraries: dict[bytes, None] = {}
     for line in np.flatnonzero(others & (text.counts > 0)).tolist():
         first = text.first[line]
         word = text.word(first).lower()
         if word in known or word == _LIBRARY:
             end = text.starts[line + 1] if line + 1 < len(text.starts) else len(data)
-            name = name_of(data[text.ends[first] : end].replace(b"\\\n", b" "))
+            name = named(data[text.ends[first] : end].replace(b"\\\n", b" "))
             if word == _LIBRARY:
-                libraries.append(name)
+                libraries[name] = None
             else:
                 given[known[word]].append((line, name))
         elif word in _DROPPED:
             lost[_DROPPED[word]] += 1
-        else:
+        elif word != _TAG:
             lost["other statements"] += 1
+    encoding = encoding_of(b"".join([*libraries, *(n for own in given.values() for _, n in own)]))
     labels: dict[str, Labels] = {}
     for kind, entries in given.items():
         if not entries or not len(face_lines):
             continue
-        numbers: dict[str, int] = {}
+        numbers: dict[bytes, int] = {}
         of_entry = [numbers.setdefault(name, len(numbers)) for _, name in entries]
         place = np.searchsorted([line for line, _ in entries], face_lines) - 1
         of_face = np.where(place >= 0, np.array(of_entry)[place], NONE)
-        labels[kind] = Labels(tuple(numbers), of_face)
-    return labels, tuple(dict.fromkeys(libraries))
+        labels[kind] = Labels(tuple(name.decode(encoding) for name in numbers), of_face)
+    return labels, tuple(name.decode(encoding) for name in libraries), encoding
 
 
 def write_obj(mesh: MeshFile) -> bytes:
@@ -268,7 +312,7 @@ def write_obj(mesh: MeshFile) -> bytes:
     if normals is not None:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
     pieces += _faces_text(mesh, uv, normals, first)
-    return "".join(pieces).encode()
+    return "".join(pieces).encode(mesh.encoding)
 
 
 def _faces_text(
@@ -301,10 +345,16 @@ def _run_text(
     mesh: MeshFile, begin: int, end: int, uv: Layer | None, normals: Layer | None
 ) -> Iterator[str]:
     """Write faces that all have the same kinds of references."""
-    form = " %d" + ("/%d" if uv is not None else "/" if normals is not None else "")
-    form += "/%d" if normals is not None else ""
+    form = " %" + ("/%" if uv is not None else "/" if normals is not None else "")
+    form += "/%" if normals is not None else ""
     columns = [mesh.corners, *(layer.rows for layer in (uv, normals) if layer is not None)]
     sizes = mesh.sizes
+    if (sizes[begin:end] == sizes[begin]).all():
+        size, share = int(sizes[begin]), slice(mesh.offsets[begin], mesh.offsets[end])
+        numbers = np.stack([column[share] + 1 for column in columns], axis=1)
+        yield from whole_rows(f"f{form * size}\n".encode(), numbers.reshape(end - begin, -1))
+        return
+    form = form.replace("%", "%d")
     for start in range(begin, end, BLOCK):
         stop = min(start + BLOCK, end)
         share = slice(mesh.offsets[start], mesh.offsets[stop])

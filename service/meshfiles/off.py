@@ -1,4 +1,4 @@
-"""The Object File Format: text, faces with any number of corners, colours behind them.
+"""The Object File Format: text or binary, faces with any number of corners, colours behind them.
 
 trimesh and meshio stop at polygons, at headers that are not alone on their line, and at comments.
 """
@@ -26,16 +26,15 @@ def read_off(data: bytes) -> MeshFile:
     """Read positions and polygons, and the colours, normals and texture coordinates with them.
 
     Raises:
-        UnreadableError: not a text OFF file, or one without all of its faces.
+        UnreadableError: not an OFF file, or one without all of its faces.
     """
+    header = HEADER.match(data)
+    if header is not None and header[2]:
+        return _of_binary(data, data.find(b"\n", header.end()) + 1, header[1] or b"")
     data = plain_text(data)
     header = HEADER.match(data)
     if header is None:
         raise UnreadableError("this is not an OFF file: it begins neither with OFF nor with counts")
-    prefix = header[1] or b""
-    uv, colour, normal, w = (kind in prefix for kind in (b"ST", b"C", b"N", b"4"))
-    if header[2]:
-        raise UnreadableError("the OFF file is binary: only text is read")
     text = cut_text(data[header.end() :], "OFF", data.count(b"\n", 0, header.end()))
     # Vertices, faces, edges: the last is of no use, and some programs leave it out.
     counts = text.numbers(np.arange(min(2, len(text.begins))), np.int64)
@@ -47,20 +46,45 @@ def read_off(data: bytes) -> MeshFile:
     words = len(text.begins) - begin
     if min(vertex_count, face_count - 1) < 0 or 3 * vertex_count + 2 * face_count > words:
         raise UnreadableError(_CUT_OFF)
-    table, at = _vertices(text, begin, vertex_count, 3 + w + 3 * normal + 2 * uv, colour)
-    widths = {"": 3, "w": w, NORMAL: 3 * normal, COLOUR: 0, UV: 2 * uv}
-    widths[COLOUR] = table.shape[1] - sum(widths.values())
+    widths = _widths(header[1] or b"")
+    width = sum(widths.values()) - widths[COLOUR]
+    table, at = _vertices(text, begin, vertex_count, width, widths[COLOUR] > 0)
+    widths[COLOUR] = table.shape[1] - width
+    sizes, corners, of_faces, end = _faces(text, at, face_count)
+    lost = {"words behind the last face": len(text.begins) - end}
+    return _mesh(table, widths, sizes, corners, of_faces, lost)
+
+
+def is_binary(data: bytes) -> bool:
+    """Return whether the header says that numbers follow as words of four bytes."""
+    header = HEADER.match(data)
+    return header is not None and header[2] is not None
+
+
+def _widths(prefix: bytes) -> dict[str, int]:
+    """Return how many numbers of each kind a vertex has, in their order."""
+    uv, colour, normal, w = (kind in prefix for kind in (b"ST", b"C", b"N", b"4"))
+    return {"": 3, "w": int(w), NORMAL: 3 * normal, COLOUR: 4 * colour, UV: 2 * uv}
+
+
+def _mesh(
+    table: Float[np.ndarray, "V K"],
+    widths: dict[str, int],
+    sizes: Int[np.ndarray, " F"],
+    corners: Int[np.ndarray, " C"],
+    of_faces: Float[np.ndarray, "F K"] | None,
+    lost: dict[str, int],
+) -> MeshFile:
+    """Return a mesh of the numbers of vertices, and faces with colours: None where some have."""
     columns = np.split(table, np.cumsum([*widths.values()])[:-1], axis=1)
     parts = dict(zip(widths, columns, strict=True))
-    sizes, corners, of_faces, end = _faces(text, at, face_count)
-    behind = "words behind the last face"
-    lost = {"fourth coordinates": int((parts["w"] != 1).sum()), behind: len(text.begins) - end}
+    lost = {"fourth coordinates": int((parts["w"] != 1).sum()), **lost}
     if widths[COLOUR] not in (0, 3, 4):
-        lost["values of vertices"] = vertex_count
+        lost["values of vertices"] = len(table)
         del parts[COLOUR]
     face_values: dict[str, np.ndarray] = {}
     if of_faces is None:
-        lost["colours of faces"] = face_count
+        lost["colours of faces"] = len(sizes)
     elif of_faces.shape[1] > 0:
         face_values[COLOUR] = colours_of(of_faces)
     layers = {
@@ -78,6 +102,66 @@ def read_off(data: bytes) -> MeshFile:
         face_values=face_values,
         changes=dropped(lost),
     )
+
+
+def _of_binary(data: bytes, at: int, prefix: bytes) -> MeshFile:
+    """Read what follows the header of a binary file: words of four bytes, the highest first.
+
+    Some programs write the lowest first.
+    """
+    words, widths = (len(data) - at) // 4, _widths(prefix)
+    width = sum(widths.values())
+    for order in ">", "<":
+        whole = np.frombuffer(data, f"{order}i4", words, at)
+        if words < 3:
+            break
+        vertex_count, face_count = whole[:2].tolist()
+        begin = 3 + width * vertex_count
+        # A face has its size and the number of its colour's components.
+        if vertex_count >= 0 and face_count > 0 and begin + 2 * face_count <= words:
+            table = np.frombuffer(data, f"{order}f4", begin - 3, at + 12).reshape(-1, width)
+            return _with_binary_faces(table.astype(np.float64), widths, whole[begin:], face_count)
+    raise UnreadableError(_CUT_OFF)
+
+
+def _with_binary_faces(
+    table: Float[np.ndarray, "V K"], widths: dict[str, int], words: np.ndarray, count: int
+) -> MeshFile:
+    """Read binary faces: a size, corners, and how many components of a colour follow."""
+    size = int(words[0])
+    colour = int(words[1 + size]) if 0 <= size < len(words) - 1 else -1
+    stride = size + 2 + colour
+    if colour >= 0 and count * stride <= len(words):
+        rows = words[: count * stride].reshape(count, stride)
+        if (rows[:, [0, 1 + size]] == (size, colour)).all():
+            places = stride * np.arange(count)
+            return _binary_mesh(table, widths, words, places, count * stride)
+    places, at, values = np.zeros(count, dtype=np.int64), 0, words.tolist()
+    # One by one: where a face begins depends on the sizes of those before it.
+    for face in range(count):
+        places[face] = at
+        for _ in range(2):
+            if at >= len(values) or not 0 <= values[at] < len(values) - at:
+                raise UnreadableError(_CUT_OFF)
+            at += 1 + values[at]
+    return _binary_mesh(table, widths, words, places, at)
+
+
+def _binary_mesh(
+    table: Float[np.ndarray, "V K"],
+    widths: dict[str, int],
+    words: np.ndarray,
+    places: Int[np.ndarray, " F"],
+    end: int,
+) -> MeshFile:
+    sizes = words[places].astype(np.int64)
+    corners = words[_behind(places, sizes)].astype(np.int64)
+    components, of_faces = words[places + 1 + sizes], None
+    if (components == components[0]).all() and components[0] in (0, 3, 4):
+        behind = (places + 2 + sizes)[:, None] + np.arange(components[0])
+        of_faces = words.view(f"{words.dtype.byteorder}f4")[behind].astype(np.float64)
+    lost = {"words behind the last face": len(words) - end}
+    return _mesh(table, widths, sizes, corners, of_faces, lost)
 
 
 def _has_edge_count(text: Text) -> bool:

@@ -30,7 +30,6 @@ from .mesh_file import (
     Layer,
     MeshFile,
     joined_layer,
-    of_triangles,
     shown,
 )
 from .triangulate import area_vectors
@@ -77,22 +76,30 @@ def chosen_of(mesh: MeshFile, options: Options) -> Bool[np.ndarray, " F"] | None
 
 
 def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
-    """Divide triangles by material, in the order in which materials occur.
+    """Divide triangles by material and by the layers that they have, in the order of the file.
 
-    A part has the layers that all of its corners have; what others lose is reported.
+    Values that float32 cannot hold are dropped and reported.
     """
     materials = mesh.labels.get(MATERIAL)
     count = len(mesh.faces)
-    of_face = np.zeros(count, dtype=np.int64) if materials is None else materials.of_face + 1
-    order, first = number_by_first_appearance(of_face)
+    order, first = number_by_first_appearance(kinds_of(mesh))
     parts: list[Part] = []
     lost: dict[str, int] = {}
     for number, place in enumerate(first.tolist()):
         faces = np.arange(count) if len(first) == 1 else np.flatnonzero(order == number)
-        material = NONE if materials is None else int(of_face[place]) - 1
+        material = NONE if materials is None else int(materials.of_face[place])
         primitive = _primitive(mesh, faces, number, lost)
         parts.append(Part(primitive, faces, material))
     return parts, [Change("", f"{what} dropped", faces) for what, faces in lost.items()]
+
+
+def kinds_of(mesh: MeshFile) -> Int[np.ndarray, " F"]:
+    """Return labels that faces share if they have one material and the same layers."""
+    materials = mesh.labels.get(MATERIAL)
+    kind = np.zeros(len(mesh.sizes), dtype=np.int64) if materials is None else materials.of_face + 1
+    for layer in mesh.layers.values():
+        kind = 2 * kind + np.logical_and.reduceat(layer.rows >= 0, mesh.offsets[:-1])
+    return kind
 
 
 def _primitive(
@@ -102,15 +109,11 @@ def _primitive(
     layers: dict[str, Layer] = {}
     for name, layer in mesh.layers.items():
         rows = layer.rows[corners]
-        some = rows >= 0
-        what = shown(name)
-        if not some.any():
+        if (rows < 0).any():
             continue
-        if not some.all():
-            what += " that not all corners of a material have"
-            lost[what] = lost.get(what, 0) + int(some.reshape(-1, 3).any(axis=1).sum())
-        elif not (np.abs(layer.values) <= LARGEST).all():
-            lost[f"{what}, of which some are no numbers of float32,"] = len(faces)
+        if not (np.abs(layer.values) <= LARGEST).all():
+            what = f"{shown(name)}, of which some are no numbers of float32,"
+            lost[what] = lost.get(what, 0) + len(faces)
         else:
             layers[name] = Layer(layer.values, rows)
     vertex = mesh.corners[corners]
@@ -225,11 +228,14 @@ def joined(
         kind: Labels(label.names, label.of_face[ranks]) for kind, label in mesh.labels.items()
     }
     return replace(
-        of_triangles(vertices, corners),
+        mesh,
+        vertices=vertices,
+        offsets=np.arange(0, corners.size + 1, 3),
+        corners=corners.reshape(-1).astype(np.int64),
         layers=layers,
         face_values={name: values[ranks] for name, values in mesh.face_values.items()},
         labels=labels,
-        libraries=mesh.libraries,
-        double=mesh.double,
+        changes=(),
+        tags=None,
         parents=None if parents is None else parents.take(used),
     )

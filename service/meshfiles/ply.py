@@ -27,7 +27,7 @@ from .mesh_file import (
     dropped,
     offsets_of,
 )
-from .text import count_words, cut_text, parsed, plain_text
+from .text import count_words, cut_text, encoding_of, parsed, plain_text
 
 # It is text, and a file may be one long comment.
 LONGEST = 2**20
@@ -94,12 +94,14 @@ class PlyHeader:
         elements: in their order.
         end: where what they hold begins.
         textures: names of images in comments, as MeshLab writes them.
+        encoding: of its letters.
     """
 
     order: str | None
     elements: list[Element]
     end: int
-    textures: int = 0
+    textures: tuple[str, ...] = ()
+    encoding: str = "utf-8"
 
 
 def ply_header(data: bytes) -> PlyHeader:
@@ -108,8 +110,10 @@ def ply_header(data: bytes) -> PlyHeader:
     end = _END.search(start.replace(b"\r", b"\n") if b"\n" not in start[:80] else start)
     if not start.startswith(b"ply") or end is None:
         raise UnreadableError("this is not a PLY file, or its header has no end")
-    order, elements, textures = "", list[Element](), 0
-    lines = start[3 : end.start()].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
+    order, elements, textures = "", list[Element](), list[str]()
+    text = start[3 : end.start()]
+    encoding = encoding_of(text)
+    lines = text.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
     for number, line in enumerate(lines.split("\n"), start=1):
         match line.split():
             case ["format", name, *_] if name in _ORDERS:
@@ -122,8 +126,8 @@ def ply_header(data: bytes) -> PlyHeader:
                 elements[-1].properties.append(Property(name, _TYPES[kind], _TYPES[count]))
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1].properties.append(Property(name, _TYPES[kind]))
-            case ["comment", "TextureFile", *_]:
-                textures += 1
+            case ["comment", "TextureFile", _, *_]:
+                textures.append(line.partition("TextureFile")[2].strip())
             case ["format" | "element" | "property", *_]:
                 raise UnreadableError(f"line {number} of the PLY header: {line[:60]!r}")
             case _:
@@ -131,7 +135,7 @@ def ply_header(data: bytes) -> PlyHeader:
                 pass
     if order == "":
         raise UnreadableError("the PLY header names no format that is known")
-    return PlyHeader(_ORDERS[order], elements, end.end(), textures)
+    return PlyHeader(_ORDERS[order], elements, end.end(), tuple(textures), encoding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +163,7 @@ def read_ply(data: bytes) -> MeshFile:
     vertex, vertex_lists = _apart(tables.get("vertex", {}))
     if not {"x", "y", "z"} <= vertex.keys():
         raise UnreadableError("the PLY file has no vertices with x, y and z")
-    lost: Counter[str] = Counter({"names of textures": header.textures})
+    lost: Counter[str] = Counter()
     for element in header.elements:
         if element.name not in ("vertex", "face", STRIPS):
             lost[f"element {element.name}"] += element.rows
@@ -195,6 +199,8 @@ def read_ply(data: bytes) -> MeshFile:
             for one in element.properties
         ),
         changes=dropped(lost),
+        textures=header.textures,
+        encoding=header.encoding,
     )
 
 
@@ -383,7 +389,9 @@ def write_ply(mesh: MeshFile) -> bytes:
         kind = values.dtype.str[1:]
         add(names, values, "f4" if kind == "f8" or kind not in _NAMES else kind)
     vertex = _records(fields, columns, len(mesh.vertices))
-    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
+    head = ["ply", "format binary_little_endian 1.0"]
+    head += [f"comment TextureFile {name}" for name in mesh.textures]
+    head += [f"element vertex {len(mesh.vertices)}"]
     head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
     fields, columns = [], []
     for name, values in mesh.face_values.items():
@@ -392,7 +400,8 @@ def write_ply(mesh: MeshFile) -> bytes:
     head += [f"element face {len(mesh.sizes)}", f"property list {_NAMES[count]} int vertex_indices"]
     head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
     faces = _face_bytes(mesh, count, fields, columns)
-    return b"".join(["\n".join([*head, "end_header\n"]).encode("latin-1"), vertex.tobytes(), faces])
+    header = "\n".join([*head, "end_header\n"]).encode(mesh.encoding)
+    return b"".join([header, vertex.tobytes(), faces])
 
 
 def _names_of(layer: str, width: int) -> tuple[str, ...]:

@@ -175,7 +175,12 @@ def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
 def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
     if options.crease == "normals":
         return Creases(_hard_edges(control, mesh), border=options.border)
-    return replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    found = replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    if options.crease != "auto" or mesh.tags is None:
+        return found
+    vertex_of = np.full(len(mesh.vertices), NONE)
+    vertex_of[mesh.corners[control.places]] = control.mesh.corners
+    return mesh.tags.creases(control.mesh, vertex_of, found)
 
 
 def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
@@ -221,15 +226,16 @@ def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: O
         layers |= {
             name: Layer(np.array(values)[:, None], corners) for name, values in scalars.items()
         }
-    return MeshFile(
-        made.mesh.vertices,
-        made.mesh.offsets,
-        corners,
-        layers,
-        {name: values[of_face] for name, values in mesh.face_values.items()},
-        {kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
-        mesh.libraries,
-        mesh.double,
+    return replace(
+        mesh,
+        vertices=made.mesh.vertices,
+        offsets=made.mesh.offsets,
+        corners=corners,
+        layers=layers,
+        face_values={name: values[of_face] for name, values in mesh.face_values.items()},
+        labels={kind: Labels(own.names, own.of_face[of_face]) for kind, own in mesh.labels.items()},
+        changes=(),
+        tags=None,
     )
 
 
@@ -285,7 +291,10 @@ def _refined(
     corners = corners.reshape(-1)
     if bare.any():
         counts = 4 * np.diff(mesh.offsets) * 4 ** (options.levels - 1)
-        corners = np.where(np.repeat(bare, counts), NONE, corners)
+        bare = np.repeat(bare, counts)
+        used, inside = np.unique(corners[~bare], return_inverse=True)
+        column, corners = column[used], np.full(len(corners), NONE)
+        corners[~bare] = inside
     return Layer(column, corners)
 
 

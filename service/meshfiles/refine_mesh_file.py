@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pns_common.errors import MeshError
+from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import fans
 from pns_common.mesh.rows import marked
 from pns_common.operator.scheme import Scheme
@@ -22,12 +24,13 @@ from ..gltf.read.plan import (
     MeshPlan,
     check_memory,
 )
+from ..gltf.refine.control_mesh import ControlMesh
 from ..gltf.refine.meshes import refine_alone, stage_shares
 from ..gltf.refine.new_normals import MOST, are_one
 from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
-from .mesh_file import NORMAL, MeshFile
+from .mesh_file import NONE, NORMAL, MeshFile
 from .parts import chosen_of, joined, parts_of, with_group_normals
 from .polygons import Refined, refine_polygons
 
@@ -102,7 +105,15 @@ def _refine_triangles(
     own = None if chosen is None else [chosen[part.faces] for part in parts]
     shares = stage_shares(scheme, options)
     made = refine_alone(
-        plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
+        plan,
+        primitives,
+        scheme,
+        options,
+        course,
+        shares,
+        traced=traced,
+        chosen=own,
+        stated=_stated(mesh, options),
     )
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")
@@ -123,6 +134,22 @@ def _refine_triangles(
         # There is no document for a pointer to point into.
         changes=[*incomplete, *(replace(change, pointer="") for change in made.changes)],
     )
+
+
+def _stated(mesh: MeshFile, options: Options) -> Callable[[ControlMesh, Creases], Creases] | None:
+    """Return how creases that a file states are found in its control mesh; None: not asked for."""
+    tags = mesh.tags
+    if tags is None or options.crease != "auto":
+        return None
+
+    def creases(control: ControlMesh, found: Creases) -> Creases:
+        rows = np.concatenate([primitive.rows for primitive in control.primitives])
+        welded = control.weld.vertex_of
+        vertex_of = np.full(len(mesh.vertices), NONE)
+        vertex_of[rows[welded >= 0]] = control.cleaned.vertex_map[welded[welded >= 0]]
+        return tags.creases(control.mesh, vertex_of, found)
+
+    return creases
 
 
 def faces_after(mesh: MeshFile, levels: int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt16
 
 from pns_common.mesh.rows import cross, norm
 
@@ -15,7 +15,7 @@ from .text import cut_text, plain_text
 HEADER = 84
 # A facet as text: a normal, three vertices, and the words that name and enclose them.
 WORDS_PER_FACET = 21
-# The two bytes behind the numbers of each facet are by no standard its colour.
+# The two bytes behind the numbers of each facet are its colour to some programs.
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 # How far text is told from a binary file whose header begins as a text does.
 _START = 2**10
@@ -71,11 +71,23 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
     facets = np.frombuffer(data, facet, count, HEADER)
     told = {
         "bytes behind the last facet left out": left,
-        "colours of faces dropped": int(np.count_nonzero(facets["attribute"])),
+        "colours of faces dropped": _count_colours(data[: HEADER - 4], facets["attribute"]),
         f"count of facets corrected: the file says {said}": int(said != count),
     }
     changes = tuple(Change("", what, many) for what, many in told.items() if many)
     return facets["corners"].reshape(-1, 3).astype(np.float64), changes
+
+
+def _count_colours(header: bytes, attributes: UInt16[np.ndarray, " F"]) -> int:
+    """Return how many facets have a colour of their own.
+
+    Their highest bit says so: set as VisCAM writes it, clear where Magics' header begins with a
+    colour of the part. Bytes that are alike throughout are what a program leaves there.
+    """
+    if not len(attributes) or (attributes == attributes[0]).all():
+        return 0
+    own = (attributes >> 15) == (0 if b"COLOR=" in header else 1)
+    return int(np.count_nonzero(own))
 
 
 def _of_text(

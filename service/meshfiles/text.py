@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,15 +50,26 @@ def plain_text(data: bytes) -> bytes:
 
 
 def name_of(text: bytes) -> str:
-    """Return a name without the comment behind it; those of old files are Latin-1.
+    """Return a name without the comment behind it; those of old files are Latin-1."""
+    name = named(text)
+    return name.decode(encoding_of(name))
+
+
+def named(text: bytes) -> bytes:
+    """Return a name without the comment behind it.
 
     A # within a word, or before one as in `Material #2`, begins no comment.
     """
-    text = _BEHIND_NAME.sub(b"", text).strip()
+    return _BEHIND_NAME.sub(b"", text).strip()
+
+
+def encoding_of(text: bytes) -> str:
+    """Return UTF-8 for what reads as that; else Latin-1, which has a letter for every byte."""
     try:
-        return text.decode()
+        text.decode()
     except UnicodeDecodeError:
-        return text.decode("latin-1")
+        return "latin-1"
+    return "utf-8"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,12 +134,15 @@ class Text:
         """Return the letters of some words in ascending order, with blanks between them."""
         if not len(words):
             return np.zeros(0, dtype=np.uint8)
+        # Between the first and the last alone: files have their positions in one place.
+        begin = self.begins[words[0]]
+        letters = self.letters[begin : self.ends[words[-1]] + 1]
         # One more letter, so that the blank behind the last word is there.
-        inside = np.zeros(len(self.letters) + 1, dtype=np.int8)
-        inside[self.begins[words]] = 1
-        inside[np.minimum(self.ends[words] + 1, len(self.letters))] -= 1
+        inside = np.zeros(len(letters) + 1, dtype=np.int8)
+        inside[self.begins[words] - begin] = 1
+        inside[np.minimum(self.ends[words] + 1 - begin, len(letters))] -= 1
         taken = np.cumsum(inside, dtype=np.int8, out=inside)[:-1].view(bool)
-        return np.append(self.letters[taken], np.uint8(_BLANK))
+        return np.append(letters[taken], np.uint8(_BLANK))
 
     def numbers(
         self, words: Int[np.ndarray, " K"], dtype: type = np.float64
@@ -218,6 +233,25 @@ def _without_comments(
     blank = letters.copy()
     blank[comment] = _BLANK
     return blank
+
+
+def whole_rows(form: bytes, numbers: Int[np.ndarray, "N K"]) -> Iterator[str]:
+    """Write each row by a form that has a % for each of its numbers, which are not below 0."""
+    parts = [np.frombuffer(part, np.uint8) for part in form.split(b"%")]
+    digits = len(str(int(numbers.max(initial=0))))
+    width = sum(map(len, parts)) + digits * numbers.shape[1]
+    for begin in range(0, len(numbers), BLOCK):
+        block = numbers[begin : begin + BLOCK].astype(np.uint32 if digits < 10 else np.uint64)
+        # Zeros are left out: those in front of a number.
+        made, at = np.zeros((len(block), width), dtype=np.uint8), 0
+        for part, column in zip(parts, [*block.T, None], strict=True):
+            made[:, at : at + len(part)] = part
+            at += len(part)
+            for place in range(digits if column is not None else 0):
+                rest = column // 10 ** (digits - 1 - place)
+                made[:, at] = np.where((rest > 0) | (place == digits - 1), rest % 10 + 48, 0)
+                at += 1
+        yield made[made > 0].tobytes().decode()
 
 
 def rows_text(form: str, rows: Shaped[np.ndarray, "N K"]) -> list[str]:

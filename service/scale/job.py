@@ -128,8 +128,10 @@ def failed(path: str, output: str, error: Exception) -> Row:
 def _refine(task: Task) -> Row:
     from pns_common.errors import PnsError
 
+    from ..bodies.sibling_files import Opened
     from ..memory_cap import memory_cap
-    from ..meshfiles.convert import converted, lines_of
+    from ..meshfiles.companions import companions, copied
+    from ..meshfiles.convert import converted, lines_of, with_changes
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)
@@ -157,12 +159,19 @@ def _refine(task: Task) -> Row:
             )
     except PnsError as error:
         raise ServiceError(str(error), code="unrefinable") from error
+    report = written.report
+    if task.kind == task.target:
+        folder = output.folder
+        files = companions(data, task.kind, Opened(siblings)) if folder != source.folder else []
+        read, write = folder.content_of, lambda name, content: folder.below(name).write(content)
+        changes = copied(files, read, write, force=task.known is not None)
+        report = with_changes(report, changes)
     output.write(written.content)
     return Row(
         task.url,
         task.output,
         DONE,
-        changes="\n".join(lines_of(written.report))[:LONGEST],
+        changes="\n".join(lines_of(report))[:LONGEST],
         faces_in=written.faces_in,
         faces_out=written.faces,
         bytes_in=len(data),
@@ -209,14 +218,14 @@ def input_hash(data: bytes, kind: str, siblings: SiblingFiles, limits: Limits) -
     """Return the SHA-256 of a file and then of the names and bytes of the files that it names."""
     from ..bodies.sibling_files import Opened
     from ..gltf.read.upload import named_files
-    from ..meshfiles import mtl
+    from ..meshfiles.companions import companions
 
     digest, opened = hashlib.sha256(data), Opened(siblings)
-    of_obj = mtl.named_files(data, siblings) if kind == "obj" else []
-    for uri in of_obj or named_files(data, kind, limits):
-        file = opened.open(uri)
+    files = [(file.name, file) for file in companions(data, kind, opened)]
+    files += [(uri, opened.open(uri)) for uri in named_files(data, kind, limits)]
+    for name, file in files:
         if file is not None:
-            digest.update(f"\0{uri}\0{len(file.content)}\0".encode())
+            digest.update(f"\0{name}\0{len(file.content)}\0".encode())
             digest.update(file.content)
     return digest.hexdigest()
 

@@ -53,6 +53,16 @@ class Place:
         """Return what lies at a relative path below a folder."""
         return Place(self.system, posixpath.join(self.path, relative))
 
+    @property
+    def folder(self) -> Place:
+        """The folder that it lies in."""
+        return Place(self.system, posixpath.dirname(self.path))
+
+    def content_of(self, relative: str) -> bytes | None:
+        """Return the bytes of a file below a folder; None where there is none. Raises OSError."""
+        place = self.below(relative)
+        return place.read() if place.is_file() else None
+
     def path_to(self, other: Place) -> str | None:
         """Return the way to what lies below a folder, "." to itself; None to anything else."""
         if self.system != other.system:
@@ -158,15 +168,15 @@ class Place:
 
     def siblings(self) -> SiblingFiles:
         """Return the files in the same folder and below it, opened when a document names them."""
-        folder = Place(self.system, posixpath.dirname(self.path))
+        folder = self.folder
 
         def find(name: str) -> File | None:
-            place = folder.below(name)
             if folder.local:
-                inside = Path(place.path).resolve().is_relative_to(Path(folder.path).resolve())
-                if not inside:
+                path = Path(folder.below(name).path).resolve()
+                if not path.is_relative_to(Path(folder.path).resolve()):
                     return None
-            return File(name, place.read()) if place.is_file() else None
+            content = folder.content_of(name)
+            return None if content is None else File(name, content)
 
         # What an input's hash was made of is what is refined.
         return SiblingFiles(cache(find))

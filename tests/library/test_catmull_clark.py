@@ -132,6 +132,25 @@ def test_every_soft_crease_equals_opensubdiv(name, sharpness):
     np.testing.assert_allclose(refined.vertices[refined.faces], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("sharpness", [0.5, 1, 1.25, 2, 3.5, np.inf])
+@pytest.mark.parametrize("scheme", ["catmull-clark", "loop"])
+@pytest.mark.parametrize("name", CREASES)
+def test_every_crease_that_wears_off_equals_opensubdiv(name, scheme, sharpness):
+    points, faces = SHAPES["mixed"]
+    if scheme == "loop":
+        points, faces = SHAPES["open box"]
+        faces = [[f[0], f[k], f[k + 1]] for f in faces for k in (1, 2)]
+    sides = {frozenset(pair) for f in faces for pair in zip(f, [*f[1:], f[0]], strict=True)}
+    pairs = [pair for pair in CREASES[name] if frozenset(pair) in sides]
+    points, levels = uneven(points), 3
+    creases = Creases(np.array(pairs), np.full(len(pairs), sharpness), wears=True, levels=1)
+    made = refine(Mesh(points, faces), scheme, levels, creases=creases)
+    oracle = opensubdiv.loop if scheme == "loop" else opensubdiv.catmull_clark
+    given = min(sharpness, 10)
+    expected, *_ = oracle(points, faces, levels, pairs, sharpness=given)
+    np.testing.assert_allclose(made.mesh.vertices[made.mesh.faces], expected, rtol=0, atol=1e-12)
+
+
 @given(
     st.one_of(polygon_manifolds(), polygon_soups(), manifolds()),
     st.integers(0, 2**31),

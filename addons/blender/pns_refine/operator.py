@@ -55,6 +55,12 @@ def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [o for o in objects if o is not None and o.type == "MESH" and len(o.data.polygons)]
 
 
+def leave_edit_mode(context: bpy.types.Context) -> None:
+    """Go to object mode, where what was edited is the mesh."""
+    if context.mode == "EDIT_MESH":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
 class Refining(Settings):
     """Base of both forms of the operator."""
 
@@ -72,9 +78,9 @@ class Refining(Settings):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether it is object mode, with some mesh that has faces."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the present mode for Object Mode first")
+        """Return whether it is object or edit mode, with some mesh that has faces."""
+        if context.mode not in ("OBJECT", "EDIT_MESH"):
+            cls.poll_message_set("Leave the present mode for Object or Edit Mode first")
             return False
         if not chosen_objects(context):
             cls.poll_message_set("Select a mesh with faces first")
@@ -108,6 +114,7 @@ class Refining(Settings):
         Raises:
             PnsError: the model cannot be used.
         """
+        leave_edit_mode(context)
         objects = chosen_objects(context)
         self.objects = [key_of(obj) for obj in objects]
         self.share = Share()
@@ -152,6 +159,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Refine at once what is small, and the rest beside the interface."""
+        leave_edit_mode(context)
         if fits_at_once(made_count(chosen_objects(context), self)):
             return self.execute(context)
         chosen = {name: getattr(self, name) for name in self.as_keywords()}

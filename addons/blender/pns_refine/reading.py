@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 
 from .attributes import read_layers
+from .refining.shading import NORMALS
 from .refining.snapshot import Domain, Layer, Rule, Snapshot
 from .refining.steps import crease_sharpness_of
 
 # Rows of vertex weights that are read at once: about twenty milliseconds.
 ROWS = 2_000
-NORMALS = Layer("normals", "NORMAL", Domain.CORNER, Rule.BLEND, np.empty((0, 3)), unit=True)
 FREESTYLE = "FREESTYLE"
 
 

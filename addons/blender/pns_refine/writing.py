@@ -177,7 +177,9 @@ def _write_keys(
 def _write_normals(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:
     for layer in refined.layers:
         if layer.kind == "NORMAL":
-            if bpy.app.version >= FREE_NORMALS:
+            # Free normals stay as they are where a rig or a shape key turns the surface.
+            turns = refined.groups.shape[1] > 0 or len(refined.offsets) > 0
+            if bpy.app.version >= FREE_NORMALS and not turns:
                 normals = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "CORNER")
                 normals.data.foreach_set("vector", _flat(layer.values, np.float32))
             else:

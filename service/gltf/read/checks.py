@@ -25,7 +25,7 @@ _COLOUR, _MESHES, _TARGETS, _STRIDE, _ALIGNMENT, _QUANTIZED = (
 )
 
 # Extensions of primitives that number vertices or faces; refined ones have other numbers.
-_BY_NUMBER = ("CESIUM_primitive_outline", "EXT_mesh_primitive_edge_visibility")
+_BY_NUMBER = ("EXT_mesh_primitive_edge_visibility",)
 # In this one the numbers of vertices are the ids of a set without a source.
 _FEATURES, _SOURCES = "EXT_mesh_features", {"attribute", "texture"}
 # ASCII digits without leading zeros, so that each number has one name.

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ...report import Change
-from ..constants import SURFACES, TRIANGLES
+from ..constants import OUTLINE, SURFACES, TRIANGLES
 
 _LISTS = ("extensionsUsed", "extensionsRequired")
 # Extensions of meshes that number vertices, and that a mesh can do without. EXT_mesh_manifold says
@@ -16,7 +16,7 @@ BY_NUMBER = ("EXT_mesh_manifold", "EXT_mesh_primitive_restart", "BENTLEY_primiti
 INSTANCING = "EXT_mesh_gpu_instancing"
 # Extensions without numbers of accessors and buffer views, or with those that are yielded here.
 KNOWN = frozenset({
-    INSTANCING, "EXT_instance_features", "EXT_lights_image_based", "EXT_mesh_features",
+    INSTANCING, OUTLINE, "EXT_instance_features", "EXT_lights_image_based", "EXT_mesh_features",
     "EXT_meshopt_compression", "EXT_texture_avif", "EXT_texture_webp", "FB_ngon_encoding",
     "GODOT_single_root", "KHR_animation_pointer", "KHR_draco_mesh_compression",
     "KHR_gaussian_splatting", "KHR_implicit_shapes", "KHR_lights_punctual",
@@ -119,6 +119,8 @@ def accessor_references(tree: dict[str, Any]) -> Iterator[References]:
         for primitive in primitives:
             for attributes in (primitive["attributes"], *primitive.get("targets", [])):
                 yield from (([attributes], name) for name in attributes)
+            if (outline := primitive.get("extensions", {}).get(OUTLINE)) is not None:
+                yield [outline], "indices"
     yield tree.get("skins", []), "inverseBindMatrices"
     for animation in tree.get("animations", []):
         yield animation["samplers"], "input"

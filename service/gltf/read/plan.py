@@ -216,7 +216,8 @@ def spare(
         for primitive in mesh.primitives:
             if primitive.mode in SURFACES:
                 accessors.update(index for _, index in primitive.named)
-                accessors |= set() if primitive.indices is None else {primitive.indices}
+                others = {primitive.indices, primitive.outline}
+                accessors.update(index for index in others if index is not None)
     views = set(draco_views)
     for index in accessors:
         if index < len(document.accessors):

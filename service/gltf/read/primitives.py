@@ -14,7 +14,7 @@ from pns_common.mesh.rows import as_words, distinct_rows, marked, number_by_firs
 from ...errors import GltfError, UnsupportedFeature
 from ..constants import FAN, FLOAT, NGONS, TRIANGLES
 from .accessors import dequantised, read, read_rows
-from .schema import Accessor, Document
+from .schema import Accessor, Document, Primitive
 
 _FOLLOWS_VERTEX = re.compile(r"POSITION|JOINTS_[0-9]+|WEIGHTS_[0-9]+")
 
@@ -32,6 +32,7 @@ class TrianglePrimitive:
         targets: for each morph target, arrays by name that are added to the attributes.
         target_accessors: for each morph target, descriptions by name.
         positions: the number of the accessor of positions, whose elements `rows` are.
+        outline: pairs of elements of the accessors between which lines are drawn; None: none.
         ngons: whether successive triangles that begin with one vertex are one polygon.
     """
 
@@ -44,6 +45,7 @@ class TrianglePrimitive:
     target_accessors: tuple[dict[str, Accessor], ...] = ()
     positions: int = 0
     ngons: bool = False
+    outline: Int[np.ndarray, "N 2"] | None = None
 
     @property
     def is_double(self) -> bool:
@@ -94,7 +96,21 @@ def read_primitive(
         target_accessors=tuple(described for _, described in targets),
         positions=primitive.attributes["POSITION"],
         ngons=NGONS in primitive.extensions and primitive.mode == TRIANGLES,
+        outline=_read_outline(document, buffers, primitive, count),
     )
+
+
+def _read_outline(
+    document: Document, buffers: Sequence[memoryview], primitive: Primitive, count: int
+) -> Int[np.ndarray, "N 2"] | None:
+    index = primitive.outline
+    if index is None:
+        return None
+    pairs = read(document, buffers, index).astype(np.int64).reshape(-1, 2)
+    if pairs.max(initial=0) >= count:
+        what = f"an outline has index {pairs.max()}, but there are {count} vertices"
+        raise GltfError(what, pointer=f"/accessors/{index}")
+    return pairs
 
 
 def triangles(corners: Int[np.ndarray, " C"], mode: int) -> Int[np.ndarray, "F 3"]:

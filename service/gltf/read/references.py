@@ -11,7 +11,7 @@ from typing import Any
 
 from ...errors import GltfError
 from ...report import Change
-from ..constants import COMPONENT_TYPES, UNSIGNED_INTEGERS
+from ..constants import COMPONENT_TYPES, OUTLINE, UNSIGNED_INTEGERS
 from .accessors import element_size
 from .container import escaped
 from .schema import Accessor, Document, Material, Primitive, Sparse, TextureInfo
@@ -118,6 +118,8 @@ def _check_primitive(document: Document, primitive: Primitive, pointer: str) -> 
         indices = document.accessors[primitive.indices]
         if indices.type != "SCALAR" or indices.component_type not in UNSIGNED_INTEGERS:
             raise GltfError("indices must be unsigned scalars", pointer=f"{pointer}/indices")
+    if OUTLINE in primitive.extensions:
+        _check_outline(document, primitive, f"{pointer}/extensions/{OUTLINE}")
     for place, attributes in [("attributes", primitive.attributes)] + [
         (f"targets/{number}", target) for number, target in enumerate(primitive.targets)
     ]:
@@ -129,6 +131,17 @@ def _check_primitive(document: Document, primitive: Primitive, pointer: str) -> 
             f"the attributes have different counts: {sorted(counts)}",
             pointer=f"{pointer}/attributes",
         )
+
+
+def _check_outline(document: Document, primitive: Primitive, pointer: str) -> None:
+    if primitive.outline is None:
+        raise GltfError("an outline names an accessor as its indices", pointer=pointer)
+    refer(primitive.outline, document.accessors, f"{pointer}/indices")
+    stored = document.accessors[primitive.outline]
+    fits = stored.type == "SCALAR" and stored.component_type in UNSIGNED_INTEGERS
+    # Without bytes a count would cost nothing.
+    if not fits or stored.count % 2 or stored.buffer_view is None or stored.sparse is not None:
+        raise GltfError("an outline has pairs of unsigned scalars", pointer=f"{pointer}/indices")
 
 
 def _texture_infos(material: Material) -> Iterable[tuple[str, TextureInfo]]:

@@ -14,6 +14,7 @@ from msgspec import Meta
 
 from ...errors import GltfError
 from ...report import Change
+from ..constants import OUTLINE
 
 # Above every size of a file, and the range in which doubles tell integers apart.
 _MOST = 2**53
@@ -101,6 +102,13 @@ class Primitive(Part, frozen=True):
     mode: Annotated[int, Meta(ge=0, le=6)] = 4
     targets: list[dict[str, Index]] = []
     extensions: dict[str, Any] = {}
+
+    @property
+    def outline(self) -> int | None:
+        """The accessor of pairs of vertices between which lines are drawn; None without one."""
+        entry = self.extensions.get(OUTLINE)
+        index = entry.get("indices") if isinstance(entry, dict) else None
+        return index if isinstance(index, int) else None
 
     @property
     def named(self) -> list[tuple[str, int]]:

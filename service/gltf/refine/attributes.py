@@ -45,7 +45,8 @@ class RefinedPrimitive:
     """A refined primitive, in the types in which it is written.
 
     `vertex` is the vertex of the refined mesh at each row; None where it was cut from a union.
-    `counts` is how many of the faces each face before became; None: as many of each.
+    `counts` is how many of the faces each face before became; None: as many of each. `outline` are
+    the pairs of rows between which lines are drawn; None: the primitive draws none.
     """
 
     source: TrianglePrimitive
@@ -54,6 +55,7 @@ class RefinedPrimitive:
     targets: list[Columns]
     vertex: Int[np.ndarray, " N"] | None = None
     counts: Int[np.ndarray, " P"] | None = None
+    outline: Int[np.ndarray, "N 2"] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +45,7 @@ class RefinedMesh:
         limit_normals: of the limit surface, if the vertices are on it.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
+        levels: the topologies that were refined, control mesh first; none for a union.
     """
 
     mesh: Mesh
@@ -55,6 +57,7 @@ class RefinedMesh:
     limit_normals: Float[np.ndarray, "V 3"] | None
     parents: SubdivisionMatrix | None = None
     topology: Topology | None = None
+    levels: Sequence[Topology] = ()
 
 
 def creases_of(
@@ -113,7 +116,7 @@ def _creases_of_parts(control: ControlMesh, parts: Parts, scheme: Scheme) -> Cre
 
 def sharp_after(creases: Creases, levels: int) -> Int[np.ndarray, "N 2"] | None:
     """Return the named edges that are sharp at the last level."""
-    return creases.sharp_pairs if creases.sharp_at(levels - 1) else None
+    return creases.sharp_pairs(levels - 1)
 
 
 def refined_mesh(
@@ -154,6 +157,7 @@ def refined_mesh(
         made.normals,
         made.parents if traced else None,
         levels[0],
+        levels,
     )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 
+from pns_common.mesh.creases import Creases
 from pns_common.operator.scheme import Scheme
 from pns_common.progress import LEARNED_COST
 from pns_common.schemes.matrix import SubdivisionMatrix
@@ -37,6 +38,7 @@ from .mesh_refine import (
     sharp_after,
 )
 from .new_normals import with_normal_rule, with_smooth_normals
+from .outlines import refined_outlines, with_outline
 from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces
 from .together import MeshOutcome, StageShares, kind_of, refine_together
@@ -205,11 +207,13 @@ def refine_alone(
     traced: bool = False,
     chosen: Chosen | None = None,
     found: Sequence[Found] | None = None,
+    stated: Callable[[ControlMesh, Creases], Creases] | None = None,
 ) -> MeshOutcome:
     """Refine one mesh, given by its primitives.
 
     `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone;
-    `found` are polygons of its triangles, for a scheme of polygons.
+    `found` are polygons of its triangles, for a scheme of polygons; `stated` adds creases to
+    those that the options ask for.
     """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
@@ -217,6 +221,8 @@ def refine_alone(
         if found is not None:
             control = control.joined(found)
         creases = creases_of(control, options, scheme)
+        if stated is not None and not control.is_empty:
+            creases = stated(control, creases)
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)
@@ -235,6 +241,12 @@ def refine_alone(
                 )
             else:
                 refined = refined_primitives(control, made, grid, blend, course, cut)
+            for number, edges in refined_outlines(control, made.levels).items():
+                source = control.primitives[number].number
+                refined = [
+                    with_outline(each, edges) if each.source.number == source else each
+                    for each in refined
+                ]
             if cut is not None and made.parents is not None:
                 made = replace(made, parents=made.parents.unmoved(cut.still))
     changes = [

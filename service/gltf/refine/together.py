@@ -108,6 +108,9 @@ def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
         for name, values in primitive.attributes.items()
         if name.startswith("JOINTS_")
     }
+    # The edges of a union are not followed.
+    if any(primitive.outline is not None for primitive in primitives):
+        return None
     # Joints of a wide primitive may reach into a narrow one and widen it, in its mesh alone.
     if len(joints) > 1:
         return None

@@ -15,8 +15,9 @@ from pns_common.mesh.rows import extent
 
 from ...course import Course
 from ...report import Change
+from ..constants import OUTLINE
 from ..read.compressed import DRACO
-from ..read.extensions import declare
+from ..read.extensions import declare, drop
 from ..read.schema import Accessor
 from ..refine.attributes import RefinedPrimitive
 from .writer import Writer, describe
@@ -143,6 +144,11 @@ class DracoWriter(Writer):
             "bufferView": self.add_view(self.stored(data)),
             "attributes": made.ids,
         }
+        if refined.outline is not None:
+            drop(primitive, OUTLINE)
+            pointer = f"/meshes/{mesh}/primitives/{refined.source.number}"
+            what = f"{OUTLINE} left out: Draco orders vertices anew"
+            self.plain.append(Change(pointer, what, 1))
         self.encoded += 1
         return len(made.attributes["POSITION"])
 

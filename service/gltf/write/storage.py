@@ -13,7 +13,7 @@ from jaxtyping import Shaped
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...report import Change
-from ..constants import FAN, FLOAT, NGONS, STRIP, SURFACES
+from ..constants import FAN, FLOAT, NGONS, OUTLINE, STRIP, SURFACES
 from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import drop, withdraw
 from ..read.plan import MeshPlan, Spare
@@ -54,8 +54,9 @@ def withdraw_unused(tree: dict[str, Any]) -> None:
     if not still_needed(tree):
         withdraw(tree, QUANTIZATION)
     primitives = (p for mesh in tree.get("meshes", []) for p in mesh.get("primitives", []))
-    if not any(NGONS in p.get("extensions", {}) for p in primitives):
-        withdraw(tree, NGONS)
+    named = {name for primitive in primitives for name in primitive.get("extensions", {})}
+    for name in {NGONS, OUTLINE} - named:
+        withdraw(tree, name)
 
 
 def leave_out_ngons(tree: dict[str, Any], mesh: int, numbers: Iterable[int]) -> list[Change]:
@@ -130,7 +131,8 @@ def same_geometry(document: Document, meshes: Iterable[int]) -> dict[int, list[i
 
 def _geometry(primitive: Primitive) -> Hashable:
     targets = tuple(tuple(target.items()) for target in primitive.targets)
-    return primitive.mode, primitive.indices, tuple(primitive.attributes.items()), targets
+    attributes = tuple(primitive.attributes.items())
+    return primitive.mode, primitive.indices, attributes, targets, primitive.outline
 
 
 def matrix_arrays(parents: SubdivisionMatrix, under: str = "") -> Arrays:

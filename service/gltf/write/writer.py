@@ -19,11 +19,13 @@ from ..constants import (
     COLUMNS,
     COMPONENT_TYPES,
     ELEMENT_ARRAY_BUFFER,
+    OUTLINE,
     TRIANGLES,
     UNSIGNED_INT,
     WIDEST,
 )
 from ..read.compressed import DRACO
+from ..read.extensions import drop
 from ..read.plan import Spare
 from ..read.schema import Accessor
 from ..refine.attributes import RefinedPrimitive
@@ -81,6 +83,11 @@ class Writer:
             shared = {key: like[key] for key in GEOMETRY if key in like}
             primitive.update(deepcopy(shared))
             _name_triangles(primitive)
+            if OUTLINE in primitive.get("extensions", {}):
+                drop(primitive, OUTLINE)
+            if OUTLINE in like.get("extensions", {}):
+                outline = deepcopy(like["extensions"][OUTLINE])
+                primitive.setdefault("extensions", {})[OUTLINE] = outline
             if DRACO in like.get("extensions", {}):
                 data = deepcopy(like["extensions"][DRACO])
                 primitive.setdefault("extensions", {})[DRACO] = data
@@ -107,7 +114,20 @@ class Writer:
         count = len(refined.attributes["POSITION"])
         indices = as_indices(refined.faces, count).reshape(-1, 1)
         self.set_indices(primitive, self._accessor(indices, ELEMENT_ARRAY_BUFFER, "SCALAR"))
+        if refined.outline is not None:
+            self._set_outline(primitive, as_indices(refined.outline, count))
         return count
+
+    def _set_outline(self, primitive: dict[str, Any], pairs: Shaped[np.ndarray, "N 2"]) -> None:
+        """Set the pairs of an outline; without any it goes."""
+        if not len(pairs):
+            drop(primitive, OUTLINE)
+            return
+        values = np.ascontiguousarray(pairs).reshape(-1, 1)
+        # Compression of indices is for triangles.
+        view = Writer.stored(self, values) | {"target": ELEMENT_ARRAY_BUFFER}
+        index = self.add_accessor(values, "SCALAR", self.add_view(view))
+        primitive["extensions"][OUTLINE]["indices"] = index
 
     def set_indices(self, primitive: dict[str, Any], index: int) -> None:
         """Set a primitive's indices; their accessor keeps the name and extras of the old one."""

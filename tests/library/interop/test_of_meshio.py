@@ -83,3 +83,43 @@ class TestMeshio:
         refined = subdivide(given, 1, SCHEME, triangulate=True)
         assert [block.data.shape for block in refined.cells] == [(8, 3), (4, 3)]
         assert [values.tolist() for values in refined.cell_data["part"]] == [[5] * 8, [6] * 4]
+
+    @pytest.mark.parametrize("degree", [3, 4])
+    def test_lines_follow_their_edges_and_vertices_stay(self, degree):
+        points = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [5, 5, 0], [6, 5, 0]])
+        faces = [[0, 1, 2], [0, 2, 3]] if degree == 3 else [[0, 1, 2, 3]]
+        given = self.meshio.Mesh(
+            points,
+            [
+                ("vertex", [[4], [1]]),
+                ("line", [[1, 0], [4, 5]]),
+                ("triangle" if degree == 3 else "quad", faces),
+                ("line", [[1, 2]]),
+            ],
+            cell_data={"tag": [[7, 8], [1, 2], [3] * len(faces), [4]]},
+            cell_sets={"rim": [[1], [0], [], [0]]},
+        )
+        scheme = "loop" if degree == 3 else "catmull-clark"
+        refined = subdivide(given, 2, scheme, limit=False)
+        assert [block.type for block in refined.cells][:2] == ["vertex", "line"]
+        assert refined.cells[0].data.tolist() == [[4], [1]]
+        rim, along = refined.cells[1].data, refined.cells[3].data
+        # From vertex 1 to vertex 0, each part behind the other; no edge, no parts.
+        assert (rim[0, 0], rim[3, 1], rim[4].tolist()) == (1, 0, [4, 5])
+        assert rim[:3, 1].tolist() == rim[1:4, 0].tolist()
+        faces = refined.cells[2].data
+        sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        known = {frozenset(side) for side in sides.tolist()}
+        assert {frozenset(part) for part in [*rim[:4].tolist(), *along.tolist()]} <= known
+        assert (along[0, 0], along[-1, 1]) == (1, 2)
+        tags = [values.tolist() for values in refined.cell_data["tag"]]
+        assert (tags[0], tags[1], tags[3]) == ([7, 8], [1] * 4 + [2], [4] * 4)
+        assert set(tags[2]) == {3}
+        sets = [cells.tolist() for cells in refined.cell_sets["rim"]]
+        assert sets == [[1], [0, 1, 2, 3], [], [0, 1, 2, 3]]
+        assert len(along) == 4
+
+    def test_other_cells_beside_faces_are_refused_with_what_to_do(self):
+        cells = [("triangle", [[0, 1, 2]]), ("tetra", [[0, 1, 2, 3]])]
+        with pytest.raises(MeshError, match=r"type tetra.*the blocks of faces"):
+            subdivide(self.meshio.Mesh(np.eye(4)[:, :3], cells))

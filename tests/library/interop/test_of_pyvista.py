@@ -86,3 +86,29 @@ class TestPyvista:
         plane.cell_data["side"] = [0, 1]
         refined = subdivide(plane, 1, SCHEME, triangulate=True)
         assert refined.cell_data["side"].tolist() == [0] * 8 + [1] * 8
+
+    @pytest.mark.parametrize("place", ["point_data", "cell_data"])
+    def test_what_is_active_stays_active(self, place):
+        given = self.mesh()
+        given.cell_data["force"] = np.ones((len(FACES), 3))
+        given.cell_data["heat"] = np.arange(len(FACES)) / 2.0
+        where = place.removesuffix("_data")
+        vectors, scalars = {"point": ("velocity", "x"), "cell": ("force", "heat")}[where]
+        given.set_active_vectors(vectors, preference=where)
+        given.set_active_scalars(scalars, preference=where)
+        refined = subdivide(given, 1, SCHEME)
+        assert refined.active_vectors_info[:] == given.active_vectors_info[:]
+        assert refined.active_scalars_info[:] == given.active_scalars_info[:]
+        assert getattr(refined, place).active_scalars_name == scalars
+
+    def test_parts_without_faces_stay_in_a_collection(self):
+        line, cloud = self.pyvista.Line(), self.pyvista.PolyData(np.eye(3))
+        nested = self.pyvista.MultiBlock([self.mesh(), line, cloud])
+        given = self.pyvista.MultiBlock([nested, None, self.mesh()])
+        refined = subdivide(given, 1, SCHEME)
+        counts = [0 if block is None else block.n_points for block in refined[0]]
+        assert counts[1:] == [2, 3]
+        assert refined[0][0].n_cells == refined[2].n_cells == 4 * len(FACES)
+        assert refined[1] is None
+        with pytest.raises(MeshError, match="no faces"):
+            subdivide(line, 1, SCHEME)

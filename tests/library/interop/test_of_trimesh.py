@@ -87,3 +87,19 @@ class TestTrimesh:
         np.testing.assert_array_equal(refined.geometry["cloud"].vertices, VERTICES)
         assert len(scene.geometry["blob"].faces) == len(FACES)
         np.testing.assert_allclose(refined.bounds, scene.bounds, atol=0.5)
+
+    def test_a_density_stays_and_none_is_made_up(self):
+        given = self.mesh()
+        assert "density" not in subdivide(given, 1, SCHEME)._data
+        given.density = 7.5
+        assert subdivide(given, 1, SCHEME).density == 7.5
+
+    def test_parts_of_a_scene_without_faces_stay(self):
+        scene = self.trimesh.Scene(
+            {"part": self.mesh(), "cloud": self.trimesh.PointCloud(np.eye(3))}
+        )
+        scene.add_geometry(self.trimesh.Trimesh(vertices=np.eye(3)), geom_name="bare")
+        refined = subdivide(scene, 1, SCHEME)
+        assert len(refined.geometry["part"].faces) == 4 * len(FACES)
+        assert len(refined.geometry["cloud"].vertices) == 3
+        assert len(refined.geometry["bare"].faces) == 0

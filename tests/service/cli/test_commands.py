@@ -172,7 +172,7 @@ def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compre
     assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
     done = pns("subdivide", "packed.glb", "-o", "again.obj", "--levels", "1")
     assert done.code == 0
-    assert f"{16 * FACES:,} faces" in done.err
+    assert f"{16 * FACES:,} triangles" in done.err
 
 
 def test_a_misspelt_setting_ends_it(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,7 +63,7 @@ def test_streams_are_read_and_written(
     assert not end.value.code
     written = capfdbinary.readouterr()
     assert len(formats.read(written.out, "ply").faces) == 4 * FACES
-    assert b"stdout: 7,680 faces" in written.err
+    assert b"stdout: 7,680 triangles" in written.err
 
 
 def test_an_input_is_replaced_by_force_alone(pns: Any, tmp_path: Path, part_file: Path) -> None:

@@ -26,7 +26,7 @@ def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -
     outcome = pns(*command.split())
     assert outcome.code == 0
     assert outcome.out == ""
-    assert f"{16 * FACES:,} faces" in outcome.err
+    assert f"{16 * FACES:,} triangles" in outcome.err
     report = json.loads((tmp_path / "report.json").read_text())
     assert report == tree_of(tmp_path / "part2.glb")["asset"]["extras"]["pns"]
     assert report["totals"]["faces"] == 16 * FACES
@@ -42,6 +42,27 @@ def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -
     assert report["meshes"][0]["reference_length"] == 2.5
     attributes = tree_of(tmp_path / "out.glb")["meshes"][0]["primitives"][0]["attributes"]
     assert "_PNS_RATIO" in attributes
+
+
+def test_materials_and_textures_follow_a_result_and_replace_nothing(
+    pns: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "other").mkdir()
+    obj = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
+    (tmp_path / "in.obj").write_text(obj)
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd t.png\n")
+    (tmp_path / "t.png").write_bytes(b"t")
+    (tmp_path / "other" / "m.mtl").write_text("newmtl b\n")
+    command = ["subdivide", "in.obj", "-o", "other/x.obj", "--report", "r.json", *ONCE]
+    told = pns(*command).err
+    assert "1 × copied beside the result: t.png" in told
+    assert "--force replaces them): m.mtl" in told
+    assert (tmp_path / "other" / "m.mtl").read_text() == "newmtl b\n"
+    assert "1 × copied beside the result: m.mtl" in pns(*command, "--force").err
+    assert (tmp_path / "other" / "m.mtl").read_text() == (tmp_path / "m.mtl").read_text()
+    assert "copied" not in pns(*command).err
+    # Beside its source nothing is to be copied.
+    assert "copied" not in pns("subdivide", "in.obj", "-o", "x.obj", *ONCE).err
 
 
 def test_what_happens_in_many_places_is_said_once(pns: Any, tmp_path: Path) -> None:
@@ -71,16 +92,15 @@ def test_a_note_names_the_mesh_and_says_what_to_do(pns: Any, tmp_path: Path) -> 
     assert "points away" not in outcome.err
 
 
-def test_quads_are_told_in_triangles_too(pns: Any, tmp_path: Path) -> None:
+def test_a_line_counts_faces_or_triangles(pns: Any, tmp_path: Path) -> None:
     quads = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
     quads += "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
     (tmp_path / "in.obj").write_text(quads)
-    for target, made in (("obj", "24 faces, 48 triangles,"), ("glb", "24 faces, 48 triangles,")):
+    counts = {"obj": "24 faces", "glb": "48 triangles", "stl": "48 triangles"}
+    for target, made in counts.items():
         outcome = pns("subdivide", "in.obj", "-o", f"out.{target}", "--levels", "1")
         assert f"out.{target}: {made} in " in outcome.err
-        assert "; --levels 2 would give 192 triangles" in outcome.err
-    outcome = pns("subdivide", "in.obj", "-o", "out.stl", "--levels", "1")
-    assert "out.stl: 48 faces in " in outcome.err
+        assert f"; --levels 2 would give {4 * int(made[:2])}\n" in outcome.err
     outcome = pns("subdivide", "in.obj", "-o", "out.obj", "--levels", "6")
     assert "would give" not in outcome.err
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.bodies.sibling_files import ALONE
+from service.bodies.sibling_files import ALONE, folder_of
 from service.errors import UnrefinableError
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
@@ -367,3 +367,32 @@ def test_one_material_is_refined_and_its_neighbours_meet_it(target: str, levels:
             assert (~label.named(name)).sum() < (12 - own) * 4**levels
     with pytest.raises(UnrefinableError, match="m0, m1"):
         refined(data, "obj", target, material="m2")
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "layers"),
+    [
+        ("A1_partial_uv.obj", set(), {"TEXCOORD_0"}),
+        ("A3_partial_normals.obj", set(), {"NORMAL"}),
+        ("F1_backslash_space.obj", set(), set()),
+        ("G1_constant_attribute.stl", set(), set()),
+        ("H1_texturefile.ply", set(), {"TEXCOORD_0"}),
+        ("I1_crease_tag.obj", set(), set()),
+        ("D1_sub/D1.obj", {"embedded"}, {"TEXCOORD_0"}),
+        ("D2/D2_windows_path.obj", {"embedded"}, {"TEXCOORD_0"}),
+    ],
+)
+def test_files_of_the_fourth_collection_come_whole(
+    name: str, told: set[str], layers: set[str]
+) -> None:
+    path = shared_path("cases") / "4" / name
+    kind = path.suffix[1:]
+    options = Options(scheme="loop", levels=1)
+    made = converted(path.read_bytes(), kind, kind, options, None, Limits(), None, folder_of(path))
+    assert set(formats.read(made.content, kind).layers) == layers
+    cut = {"triangles added by cutting polygons"}
+    assert {change["what"] for change in made.report["changes"]} <= cut
+    if told:
+        beside = folder_of(path)
+        glb = converted(path.read_bytes(), kind, "glb", options, None, Limits(), None, beside)
+        assert {change["what"] for change in glb.report["changes"]} == told | cut

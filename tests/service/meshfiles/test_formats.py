@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from service.meshfiles import formats
 from service.meshfiles.convert import converted
 from service.meshfiles.example import part
 from service.meshfiles.glb import triangles_glb
-from service.meshfiles.mesh_file import MATERIAL, UV, MeshFile, of_triangles
+from service.meshfiles.mesh_file import COLOUR, MATERIAL, NORMAL, UV, MeshFile, of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.meshfiles.triangulate import triangulated
 from service.options import Limits, Options
@@ -181,6 +182,13 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
     assert {"pointer": "", "what": CUT, "count": 3} in report["changes"]
 
 
+def magics(*attributes: int) -> bytes:
+    """An STL of as many facets, with a colour of the part in its header."""
+    facet = np.array([[0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]], "<f4").tobytes()
+    head = b"COLOR=\xff\x00\x00\xff".ljust(80) + struct.pack("<I", len(attributes))
+    return head + b"".join(facet + struct.pack("<H", value) for value in attributes)
+
+
 @pytest.mark.parametrize(
     ("kind", "data", "names"),
     [
@@ -195,12 +203,12 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
             b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\nl 1 2\n",
             {"lines"},
         ),
-        (
-            "ply",
-            POLYGONS["ply"].replace(b"element", b"comment TextureFile a b.png\nelement", 1),
-            {"names of textures"},
-        ),
         ("stl", formats.write(part(), "stl")[:-2] + b"\x1f\x80", {"colours of faces"}),
+        ("stl", magics(0x7FFF, 0x001F), {"colours of faces"}),
+        # Alike throughout, or without the bit that says colour.
+        ("stl", formats.write(part(), "stl")[:-2] + b"\x20\x20", set()),
+        ("stl", magics(0xFFFF, 0x801F), set()),
+        ("stl", magics(0x001F, 0x001F), set()),
         ("off", POLYGONS["off"], {"colours of faces"}),
     ],
 )
@@ -209,6 +217,48 @@ def test_what_is_left_out_is_named(kind: str, data: bytes, names: set[str]) -> N
     assert set(told(mesh_file)) - {CUT} == {f"{name} dropped" for name in names}
     _, report = refined(mesh_file)
     assert {f"{name} dropped" for name in names} <= {c["what"] for c in report["changes"]}
+
+
+def binary_off(order: str, head: bytes, rows: list, faces: list) -> bytes:
+    """The bytes of vertices, and of faces with their colours."""
+    data = head + struct.pack(f"{order}3i", len(rows), len(faces), 0)
+    data += b"".join(struct.pack(f"{order}{len(row)}f", *row) for row in rows)
+    for corners, colour in faces:
+        data += struct.pack(f"{order}i{len(corners)}i", len(corners), *corners)
+        data += struct.pack(f"{order}i{len(colour)}f", len(colour), *colour)
+    return data
+
+
+RED, GREEN = [1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]
+CORNERS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+
+
+@pytest.mark.parametrize("order", [">", "<"])
+@pytest.mark.parametrize("faces", [[[0, 1, 2], [0, 2, 3]], [[0, 1, 2, 3], [0, 2, 1]]])
+def test_a_binary_off_says_what_a_text_says(order: str, faces: list) -> None:
+    coloured = list(zip(faces, [RED, GREEN], strict=True))
+    read = formats.read_polygons(binary_off(order, b"OFF BINARY\n", CORNERS, coloured), "off")
+    lines = [f"{len(f)} {' '.join(map(str, f))} {' '.join(map(str, c))}" for f, c in coloured]
+    points = "\n".join(" ".join(map(str, row)) for row in CORNERS)
+    text = f"OFF\n4 2 0\n{points}\n" + "\n".join(lines) + "\n"
+    same = formats.read_polygons(text.encode(), "off")
+    for name in ("vertices", "offsets", "corners"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(same, name))
+    np.testing.assert_array_equal(read.face_values[COLOUR], same.face_values[COLOUR])
+    assert read.changes == ()
+
+
+def test_a_binary_off_has_what_its_header_says() -> None:
+    rows = [[*point, 0, 0, 1, *RED] for point in CORNERS]
+    faces = [([0, 1, 2], []), ([0, 2, 3], [])]
+    data = binary_off(">", b"CNOFF BINARY\r\n", rows, faces)
+    mesh = formats.read(data + bytes(4), "off")
+    assert mesh.layers[COLOUR].values.tolist() == [RED] * 4
+    assert mesh.layers[NORMAL].values.tolist() == [[0, 0, 1]] * 4
+    assert told(mesh) == {"words behind the last face dropped": 1}
+    for end in (len(data) - 4, len(data) - 30, 40, 20, 12):
+        with pytest.raises(UnreadableError, match="ends before its last face"):
+            formats.read(data[:end], "off")
 
 
 def test_an_off_of_coloured_vertices_has_the_same_ones() -> None:

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from service.bodies.sibling_files import ALONE, File, SiblingFiles
+from service.bodies.sibling_files import ALONE, File, Opened, SiblingFiles
+from service.meshfiles.companions import companions
 from service.meshfiles.convert import converted
-from service.meshfiles.mtl import named_files
 from service.options import Limits, Options
 from tests.support.gltf import files
 
@@ -46,9 +46,11 @@ def beside(**named: bytes) -> SiblingFiles:
     )
 
 
-def tree_of(siblings: SiblingFiles, target: str = "glb") -> tuple[Any, dict[str, int]]:
+def tree_of(
+    siblings: SiblingFiles, target: str = "glb", obj: bytes = OBJ
+) -> tuple[Any, dict[str, int]]:
     options = Options(scheme="loop")
-    made = converted(OBJ, "obj", target, options, None, Limits(), siblings=siblings)
+    made = converted(obj, "obj", target, options, None, Limits(), siblings=siblings)
     told = {change["what"]: change["count"] for change in made.report["changes"]}
     return (files.unpack(made.content)[0] if target == "glb" else made.content), told
 
@@ -98,8 +100,63 @@ def test_an_obj_keeps_its_names_and_its_library() -> None:
 
 
 def test_the_files_that_an_obj_leads_to_are_named() -> None:
-    assert named_files(OBJ, beside()) == ["my scene.mtl", "tex/wall 1.png"]
-    assert named_files(OBJ, ALONE) == []
+    siblings = beside(**{"my scene.mtl": MTL + b"map_Bump tex/wall 1.png\nrefl no.png\n"})
+    named = companions(OBJ, "obj", Opened(siblings))
+    assert [file.name for file in named] == ["my scene.mtl", "tex/wall 1.png"]
+    assert companions(OBJ, "obj", Opened(ALONE)) == []
+
+
+@pytest.mark.parametrize(
+    ("library", "image", "lies"),
+    [
+        # Beside its library; from the OBJ on; of another machine; in a folder that did not come.
+        ("sub/my.mtl", "tex/a b.png", "sub/tex/a b.png"),
+        ("sub/my.mtl", "tex/a b.png", "tex/a b.png"),
+        ("sub\\my.mtl", "..\\a b.png", "a b.png"),
+        ("my.mtl", "C:\\work\\tex\\a b.png", "a b.png"),
+        ("my.mtl", "/home/me/a b.png", "a b.png"),
+        ("D:\\my.mtl", "tex\\a b.png", "a b.png"),
+        ("my.mtl", "a%20b.png", "a b.png"),
+    ],
+)
+def test_textures_are_found_wherever_they_came_to_lie(library: str, image: str, lies: str) -> None:
+    place = library.replace("\\", "/").removeprefix("D:/")
+    there = {place: MTL.replace(b"tex\\wall 1.png", image.encode()), lies: PNG}
+    siblings = SiblingFiles(lambda name: File(name, there[name]) if name in there else None)
+    obj = OBJ.replace(b"my scene.mtl", library.encode())
+    tree, told = tree_of(siblings, obj=obj)
+    assert [entry.get("uri") for entry in tree["images"]] == [None]
+    assert told == {"embedded": 1}
+    # The same files lead from an OBJ to them.
+    text, _ = tree_of(siblings, "obj", obj)
+    assert text.startswith(f"mtllib {place}\n".encode())
+    assert {file.name for file in companions(obj, "obj", Opened(siblings))} == {place, lies}
+
+
+def test_a_texture_of_another_machine_that_did_not_come_is_told() -> None:
+    mtl = MTL.replace(b"tex\\wall 1.png", b"C:\\work\\wall 1.png")
+    siblings = beside(**{"my scene.mtl": mtl + b"map_d leaf.png\n"})
+    tree, told = tree_of(siblings)
+    assert tree["images"] == [{"uri": "wall%201.png"}]
+    del told["not used by the document: tex/wall 1.png"]
+    assert told == {
+        "kept by its URI: wall%201.png did not come with the document": 1,
+        "map_d of materials dropped: not written to GLB files": 1,
+    }
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "gbk"])
+def test_names_are_written_in_the_bytes_that_were_read(encoding: str) -> None:
+    name = "墙".encode(encoding) if encoding == "gbk" else "façade".encode(encoding)
+    obj = OBJ.replace(b"brick wall", name).replace(
+        b"usemtl glass", b"g " + name + b"\nusemtl glass"
+    )
+    siblings = beside(**{"my scene.mtl": MTL.replace(b"brick wall", name)})
+    text, _ = tree_of(siblings, "obj", obj)
+    assert b"usemtl " + name + b"\n" in text
+    assert b"g " + name + b"\n" in text
+    tree, _ = tree_of(siblings, obj=obj)
+    assert "baseColorTexture" in tree["materials"][1]["pbrMetallicRoughness"]
 
 
 def test_smoothing_groups_are_hard_edges_and_stay_in_an_obj() -> None:

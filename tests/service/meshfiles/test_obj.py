@@ -5,10 +5,13 @@ import pytest
 
 from service.errors import UnreadableError, UnrefinableError
 from service.meshfiles import formats
-from service.meshfiles.mesh_file import MATERIAL, UV
+from service.meshfiles.convert import converted
+from service.meshfiles.mesh_file import MATERIAL, NORMAL, UV
 from service.meshfiles.obj import read_obj, write_obj
 from service.meshfiles.parts import chosen_of
-from service.options import Options
+from service.meshfiles.text import whole_rows
+from service.options import Limits, Options
+from tests.support.gltf import files
 
 POSITIONS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 1\nv 3 3 3\n"
 CORNERS = [[float(word) for word in line.split()[1:]] for line in POSITIONS.splitlines()]
@@ -36,6 +39,7 @@ def triangles(text: str | bytes) -> list[list[int]]:
         (POSITIONS.replace("2 2 1", "2 2 1 # a tip") + "f 1 2 5\n", [[0, 1, 4]]),
         (POSITIONS + "f 1 2\\\n3\nf 1 2 \\\r\n 5\r\n", [[0, 1, 2], [0, 1, 4]]),
         (POSITIONS + "f 1 2 3\nf 1 2 5\\", [[0, 1, 2], [0, 1, 4]]),
+        (POSITIONS + "f 1 2 \\ \n3\nf 1 2\\\t \r\n 5\r\n", [[0, 1, 2], [0, 1, 4]]),
         # A comment that names a folder ends with its line, as in `pns large` and on the page.
         (
             "# of C:\\parts\\\n" + POSITIONS + "f 1 \\\n2 3 # D:\\\nf 1 2 5\n",
@@ -129,6 +133,7 @@ def test_corners_that_name_what_is_not_there_are_reported():
     assert told == {
         "references to missing texture coordinates dropped": 1,
         "references to missing vertex normals dropped": 2,
+        "texture coordinates of faces of which not all corners have some dropped": 1,
     }
 
 
@@ -141,3 +146,53 @@ def test_an_object_is_named_before_its_vertices():
     text = write_obj(read_obj(b"v 0 0 0\nv 1 0 0\nv 0 1 0\no Cube\nf 1 2 3\n")).decode()
     assert text.splitlines()[0] == "o Cube"
     assert text.count("o Cube") == 1
+
+
+@pytest.mark.parametrize("words", ["vt .5 .25\nf 1/1 2/1 3/1\n", "vn 0 0 1\nf 1//1 2//1 3//1\n"])
+def test_corners_without_values_take_nobody_elses_away(words):
+    data = (POSITIONS.replace("2 2 1", "2 0 .5")[:-8] + words + "f 1 3 4\nf 2 5 3\n").encode()
+    name, options = UV if "vt" in words else NORMAL, Options(levels=1, scheme="loop")
+    written = converted(data, "obj", "obj", options, None, Limits())
+    mesh = read_obj(written.content)
+    has = np.logical_and.reduceat(mesh.layers[name].rows >= 0, mesh.offsets[:-1])
+    assert has.tolist() == [True] * 4 + [False] * 8
+    assert written.report["changes"] == []
+    glb = converted(data, "obj", "glb", options, None, Limits())
+    tree, _ = files.unpack(glb.content)
+    counts = {
+        name in primitive["attributes"]: tree["accessors"][primitive["indices"]]["count"]
+        for primitive in tree["meshes"][0]["primitives"]
+    }
+    assert counts == {True: 12, False: 24}
+    assert glb.report["changes"] == []
+
+
+def test_quads_without_texture_coordinates_leave_no_value_behind():
+    text = POSITIONS.replace("2 2 1", "2 0 .5").replace("3 3 3", "2 1 .5")
+    data = (text + "vt .5 .25\nf 1/1 2/1 3/1 4/1\nf 2 5 6 3\n").encode()
+    options = Options(levels=1, scheme="catmull-clark")
+    layer = read_obj(converted(data, "obj", "obj", options, None, Limits()).content).layers[UV]
+    assert (layer.rows < 0).reshape(-1, 4).all(axis=1).tolist() == [False] * 4 + [True] * 4
+    assert np.unique(layer.rows).tolist() == [-1, *range(len(layer.values))]
+
+
+@pytest.mark.parametrize("largest", [1, 9, 10, 99_999, 4_294_967_296])
+def test_rows_of_whole_numbers_are_written_as_python_writes_them(largest):
+    numbers = np.random.default_rng(0).integers(0, largest, (20_000, 4), endpoint=True)
+    numbers[0], numbers[1] = 0, largest
+    made = "".join(whole_rows(b"f %/% %//%\n", numbers))
+    assert made == "".join("f {}/{} {}//{}\n".format(*row) for row in numbers.tolist())
+
+
+def test_corners_with_as_many_slashes_in_all_are_read_word_by_word():
+    """Six slashes and three words, of which one has none; and the parts that are left out."""
+    vt = "vt 0 0\nvt 1 1\nvn 0 0 1\n"
+    read = read_obj((POSITIONS + vt + "f 1//1 2 3/2/1\nf 4/1/ 5/2 6//1\n").encode())
+    assert read.corners.tolist() == [0, 1, 2, 3, 4, 5]
+    told = {change.what for change in read.changes}
+    assert told == {
+        "texture coordinates of faces of which not all corners have some dropped",
+        "vertex normals of faces of which not all corners have some dropped",
+    }
+    with pytest.raises(UnreadableError, match=r"'1/1/1/1' is no corner"):
+        read_obj((POSITIONS + vt + "f 1/1/1/1 2/2 3/2/1\n").encode())

@@ -7,10 +7,15 @@ import struct
 import numpy as np
 import pytest
 
+from service.bodies.sibling_files import File, SiblingFiles
 from service.errors import UnreadableError
+from service.meshfiles.convert import Written, converted
 from service.meshfiles.formats import read, write
 from service.meshfiles.mesh_file import COLOUR, NORMAL, UV, MeshFile
 from service.meshfiles.ply import ply_header, read_ply
+from service.meshfiles.text import encoding_of
+from service.options import Limits, Options
+from tests.support.gltf.files import unpack
 
 POINTS = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.5, 2.0, 0.0)]
 POLYGONS = [(0, 1, 2, 3), (0, 2, 4), (0, 1, 2, 4, 3)]
@@ -111,6 +116,64 @@ def test_a_file_that_was_cut_off_says_where(order: str) -> None:
 def test_what_is_wrong_is_said_with_its_place(data: bytes, says: str) -> None:
     with pytest.raises(UnreadableError, match=says):
         read(data, "ply")
+
+
+TEXTURED = b"""ply
+format ascii 1.0
+comment TextureFile %b
+comment TextureFile b.png
+element vertex 4
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+property int texnumber
+end_header
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+3 0 1 2 6 0 0 1 0 1 1 0
+3 0 2 3 6 0 0 1 1 0 1 1
+"""
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(20)
+
+
+@pytest.mark.parametrize("name", [b"my skin.png", "façade.png".encode("latin-1")])
+def test_textures_stay_in_a_ply_and_come_into_a_glb(name: bytes) -> None:
+    there = {name.decode(encoding_of(name)): PNG, "b.png": PNG + b"b"}
+    siblings = SiblingFiles(lambda own: File(own, there[own]) if own in there else None)
+    options = Options(levels=1, scheme="loop")
+
+    def made(target: str) -> Written:
+        data = TEXTURED % name
+        return converted(data, "ply", target, options, None, Limits(), siblings=siblings)
+
+    again = made("ply")
+    assert b"comment TextureFile " + name + b"\ncomment TextureFile b.png\n" in again.content
+    assert again.report["changes"] == []
+    tree, binary = unpack(made("glb").content)
+    shown = [
+        entry["pbrMetallicRoughness"]["baseColorTexture"]["index"] for entry in tree["materials"]
+    ]
+    views = [tree["bufferViews"][tree["images"][number]["bufferView"]] for number in shown]
+    starts = [view.get("byteOffset", 0) for view in views]
+    images = [
+        bytes(binary[start : start + view["byteLength"]])
+        for start, view in zip(starts, views, strict=True)
+    ]
+    assert images == [*there.values()]
+    # A texture for each face.
+    primitives = tree["meshes"][0]["primitives"]
+    assert [primitive["material"] for primitive in primitives] == [0, 1]
+    changes = {change["what"] for change in made("obj").report["changes"]}
+    assert "names of textures dropped: not written to OBJ files" in changes
+    bare = (TEXTURED % name).replace(b"float texcoord", b"float other")
+    report = converted(bare, "ply", "glb", options, None, Limits(), siblings=siblings).report
+    told = {change["what"]: change["count"] for change in report["changes"]}
+    assert told["names of textures dropped: there are no texture coordinates"] == 2
 
 
 def test_strips_turn_every_second_triangle() -> None:

@@ -303,6 +303,24 @@ def test_files_that_a_document_names_are_part_of_it(tmp_path):
     assert refined(batch).counts == {"skipped": 1}
 
 
+def test_materials_and_textures_lie_beside_the_result_too(tmp_path):
+    mtl = b"newmtl a\nmap_Kd tex/t.png\n"
+    named = {"a.obj": b"mtllib a.mtl\nusemtl a\n" + TETRAHEDRON, "a.mtl": mtl, "tex/t.png": b"t"}
+    for name, content in named.items():
+        path = tmp_path / "in" / "b" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    batch, out = batch_of(tmp_path), tmp_path / "out" / "b"
+    assert refined(batch).counts == {"done": 1}
+    assert (out / "a.mtl").read_bytes() == mtl
+    assert (out / "tex" / "t.png").read_bytes() == b"t"
+    assert rows(batch)["a.obj"]["changes"] == "2 × copied beside the result: a.mtl, tex/t.png"
+    # What an earlier run has written follows its source.
+    (tmp_path / "in" / "b" / "a.mtl").write_bytes(mtl + b"Kd 1 0 0\n")
+    assert refined(batch).counts == {"done": 1}
+    assert (out / "a.mtl").read_bytes() == mtl + b"Kd 1 0 0\n"
+
+
 def test_a_source_that_is_gone_holds_its_result_no_longer(tmp_path):
     source = library(tmp_path / "in", ["a.obj"])
     batch = batch_of(tmp_path, to="ply")

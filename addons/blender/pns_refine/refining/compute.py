@@ -27,6 +27,7 @@ from pns_common.parallel import Blocks, available_threads
 
 from .hidden import hide_within
 from .positions import Positions, refine_positions
+from .shading import shaded
 from .shown_creases import shown_creases
 from .snapshot import Control, Faces, Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
@@ -110,6 +111,8 @@ def compute(
     for number, layer in enumerate(snapshot.layers):
         layers.append(layer.of(carry(layer)))
         bar.reach("corners", (number + 1) / len(snapshot.layers))
+    smooth = choice.crease_lines and scheme.creases.finds
+    layers = shaded(layers, steps, positions, len(loose), smooth=smooth)
     edges = np.concatenate([steps.final.edges, snapshot.edges[loose]])
     old, count = len(snapshot.points), len(positions.points)
     vertex_sharpness = np.zeros(count)

@@ -25,9 +25,13 @@ _Distances = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Refined vertices and the report, with ratio and gate of the last level that corrected."""
+    """Refined vertices and the report, with ratio and gate of the last level that corrected.
+
+    ``controls`` are the vertices before they were put on the limit surface.
+    """
 
     points: Float[np.ndarray, "W 3"]
+    controls: Float[np.ndarray, "W 3"]
     ratio: Float[np.ndarray, " L"]
     gate: Float[np.ndarray, " L"]
     normals: Float[np.ndarray, "W 3"] | None
@@ -51,7 +55,8 @@ def refine_positions(
     made = refine(mesh, scheme, levels, creases=creases, limit=limit, progress=progress)
     added = next((step.added for step in reversed(made.steps) if step.added), None)
     acted = made if added is None else added
-    return Positions(made.mesh.vertices, acted.ratio, acted.gate, made.normals, dict(made.report))
+    points = made.mesh.vertices, made.steps[-1].points
+    return Positions(*points, acted.ratio, acted.gate, made.normals, dict(made.report))
 
 
 def _level_by_level(
@@ -88,7 +93,7 @@ def _level_by_level(
         points = limit_positions(mesh.vertices, *at_last)
         normals = limit_normals(mesh.vertices, *at_last).vertices
     report = _one_report(reports, _combined(distances, sum))
-    return Positions(points, acted.ratio, acted.gate, normals, report)
+    return Positions(points, mesh.vertices, acted.ratio, acted.gate, normals, report)
 
 
 def _with_corners(creases: Creases, topology: Topology) -> Creases:

@@ -92,7 +92,7 @@ def test_seams_sharp_edges_and_marks_stay_on_their_edges():
         obj.data.edges[edge].use_edge_sharp = True
     mark_for_freestyle(obj.data, (0, 5))
     marked = {tuple(obj.data.edges[i].vertices) for i in (0, 5)}
-    new = refined(obj, levels=1).data
+    new = refined(obj, levels=1, crease_lines=False, scheme="LOOP").data
     marks = [[e.use_seam for e in new.edges], [e.use_edge_sharp for e in new.edges]]
     for mark in [*marks, freestyle_marks(new)]:
         edges = [tuple(e.vertices) for e, on in zip(new.edges, mark, strict=True) if on]
@@ -142,11 +142,51 @@ def hidden_around(mesh):
     return edges, points
 
 
-def test_flat_shading_stays_flat():
+def test_flat_faces_become_smooth_ones_between_sharp_edges():
     obj = cube()
-    obj.data.polygons[2].use_smooth = True
+    obj.data.polygons.foreach_set("use_smooth", [i == 2 for i in range(6)])
     new = refined(obj, levels=1).data
-    assert [p.use_smooth for p in new.polygons] == [8 <= p.index < 12 for p in new.polygons]
+    assert all(p.use_smooth for p in new.polygons)
+    assert sum(e.use_edge_sharp for e in new.edges) == 24
+    # A side has one normal up to its corners.
+    normals = numbers(new.corner_normals, "vector", 3)
+    assert (np.abs(normals).max(axis=1) > 0.98).all()
+    # Without edges to keep, a face that is flat among smooth ones stays flat.
+    kept = refined(obj, levels=1, crease_lines=False).data
+    assert [p.use_smooth for p in kept.polygons] == [8 <= p.index < 12 for p in kept.polygons]
+
+
+def test_normals_follow_a_rig():
+    """They are the limit surface's, and turn with the bones."""
+    obj = grid(4)
+    obj.vertex_groups.new(name="Bone").add(range(25), 1.0, "REPLACE")
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(armature)
+    chosen(armature)
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones.new("Bone").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.modifiers.new("Armature", "ARMATURE").object = armature
+    new = refined(obj, levels=1)
+    still = numbers(evaluated(new).corner_normals, "vector", 3)
+    pose = armature.pose.bones["Bone"]
+    pose.rotation_mode, pose.rotation_euler = "XYZ", (math.pi / 2, 0, 0)
+    bpy.context.view_layer.update()
+    turned = numbers(evaluated(new).corner_normals, "vector", 3)
+    matrix = np.array(pose.matrix.to_3x3()) @ np.array(pose.bone.matrix_local.to_3x3()).T
+    np.testing.assert_allclose(turned, still @ matrix.T, atol=0.02)
+    assert np.abs(turned - still).max() > 0.5
+
+
+def test_an_edited_mesh_is_refined_as_it_is_edited():
+    obj = cube()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.resize(value=(3, 3, 3))
+    assert bpy.ops.object.pns_refine(levels=1) == {"FINISHED"}
+    assert bpy.context.mode == "OBJECT"
+    assert np.abs(points_of(bpy.context.object.data)).max() > 2.9
+    assert np.abs(points_of(obj.data)).max() == 3
 
 
 def test_custom_normals_are_rebuilt():

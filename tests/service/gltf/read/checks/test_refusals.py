@@ -195,11 +195,6 @@ UNSUPPORTED = [
     ("/meshes/0/primitives/0/attributes", {"NORMAL": 1}, "a primitive without POSITION"),
     (
         "/meshes/0/primitives/0/extensions",
-        {"CESIUM_primitive_outline": {"indices": 4}},
-        "CESIUM_primitive_outline",
-    ),
-    (
-        "/meshes/0/primitives/0/extensions",
         {"EXT_mesh_primitive_edge_visibility": {"visibility": 4}},
         "EXT_mesh_primitive_edge_visibility",
     ),
