@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 import train.fitting.command
 import train.run
 from train.models.checkpoint import load_checkpoint
-from train.models.recipe import of_length
-from train.models.recipes import general, paper
+from train.models.recipes import paper
 
 ROOT = Path(__file__).resolve().parents[2]
 
