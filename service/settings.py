@@ -86,7 +86,6 @@ Hosts = Annotated[
     tuple[Annotated[str, BeforeValidator(_host)], ...],
     NoDecode,
     BeforeValidator(_listed),
-    # As none it would mean any, which nobody who sets it wants.
     BeforeValidator(_not_empty),
 ]
 Words = Annotated[tuple[Name, ...], Field(min_length=1), NoDecode, BeforeValidator(_listed)]
@@ -198,7 +197,7 @@ class Settings(BaseSettings):
     hosts: Hosts = Field(
         default=(),
         description="names under which the service is asked, with commas, `*.a.example` for any "
-        "below; none: those of loopback where it listens there and no proxy is named, else any",
+        "below, `*` for any; addresses and localhost always are",
     )
     cors_origins: Origins = Field(
         default=(), description="origins whose pages may ask, with commas; `*`: any"
