@@ -7,13 +7,12 @@ import re
 from difflib import get_close_matches
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import (
     BeforeValidator,
     ByteSize,
     Field,
-    TypeAdapter,
     model_validator,
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
@@ -115,12 +114,10 @@ class Settings(BaseSettings):
         env_prefix=PREFIX, frozen=True, extra="forbid", allow_inf_nan=False
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_unknown(cls, values: dict[str, object]) -> dict[str, object]:
-        known = {name.upper() for name in cls.model_fields}
+    @model_validator(mode="after")
+    def _refuse_unknown(self) -> Self:
+        known = {name.upper() for name in type(self).model_fields}
         words = {name.split("_")[0] for name in known}
-        ignore = TypeAdapter(bool).validate_python(values.get("ignore_unknown", False))
         for name in os.environ:
             if not name.upper().startswith(PREFIX):
                 continue
@@ -131,12 +128,12 @@ class Settings(BaseSettings):
                 raise ValueError(f"there is no setting {name}; is it {PREFIX}{near[0]}?")
             if own.split("_")[0] in words:
                 raise ValueError(f"there is no setting {name}: unset it")
-            if not ignore:
+            if not self.ignore_unknown:
                 raise ValueError(
                     f"there is no setting {name}: unset it, or set {PREFIX}IGNORE_UNKNOWN=1 if it "
                     "belongs to another program"
                 )
-        return values
+        return self
 
     ignore_unknown: bool = Field(
         default=False, description="pass over PNS_… variables that resemble no setting"
