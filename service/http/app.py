@@ -66,13 +66,12 @@ def create_app(
     settings = settings or Settings()
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
-    workers = Workers(settings.workers, settings.job_seconds, warm)
     metrics = Metrics()
+    workers = Workers(settings.workers, settings.job_seconds, warm, metrics.restart)
     service = Service(settings, workers, job, catalogue, metrics.job, metrics.catalogue)
     metrics.gauge("pns_requests_held", "Requests under way", lambda: service.places.taken.total())
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: workers.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or end", lambda: workers.held.total())
-    metrics.restarts(lambda: workers.restarts)
     tracer = tracer_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
