@@ -7,13 +7,12 @@ import re
 from difflib import get_close_matches
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import (
     BeforeValidator,
     ByteSize,
     Field,
-    TypeAdapter,
     model_validator,
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
@@ -86,7 +85,6 @@ Hosts = Annotated[
     tuple[Annotated[str, BeforeValidator(_host)], ...],
     NoDecode,
     BeforeValidator(_listed),
-    # As none it would mean any, which nobody who sets it wants.
     BeforeValidator(_not_empty),
 ]
 Words = Annotated[tuple[Name, ...], Field(min_length=1), NoDecode, BeforeValidator(_listed)]
@@ -116,12 +114,10 @@ class Settings(BaseSettings):
         env_prefix=PREFIX, frozen=True, extra="forbid", allow_inf_nan=False
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_unknown(cls, values: dict[str, object]) -> dict[str, object]:
-        known = {name.upper() for name in cls.model_fields}
+    @model_validator(mode="after")
+    def _refuse_unknown(self) -> Self:
+        known = {name.upper() for name in type(self).model_fields}
         words = {name.split("_")[0] for name in known}
-        ignore = TypeAdapter(bool).validate_python(values.get("ignore_unknown", False))
         for name in os.environ:
             if not name.upper().startswith(PREFIX):
                 continue
@@ -132,12 +128,12 @@ class Settings(BaseSettings):
                 raise ValueError(f"there is no setting {name}; is it {PREFIX}{near[0]}?")
             if own.split("_")[0] in words:
                 raise ValueError(f"there is no setting {name}: unset it")
-            if not ignore:
+            if not self.ignore_unknown:
                 raise ValueError(
                     f"there is no setting {name}: unset it, or set {PREFIX}IGNORE_UNKNOWN=1 if it "
                     "belongs to another program"
                 )
-        return values
+        return self
 
     ignore_unknown: bool = Field(
         default=False, description="pass over PNS_… variables that resemble no setting"
@@ -198,7 +194,7 @@ class Settings(BaseSettings):
     hosts: Hosts = Field(
         default=(),
         description="names under which the service is asked, with commas, `*.a.example` for any "
-        "below; none: those of loopback where it listens there and no proxy is named, else any",
+        "below, `*` for any; addresses and localhost always are",
     )
     cors_origins: Origins = Field(
         default=(), description="origins whose pages may ask, with commas; `*`: any"

@@ -131,15 +131,19 @@ def _may_have_twin(corner_edges, links, f):
 
 
 @kernel
-def mark_repeats(corners: u4_1d, offsets: i4_1d, repeats: b1_1d):
-    """Mark the faces that name a vertex twice; return whether there is one."""
+def mark_repeats(corners: u4_1d, offsets: i4_1d, last_face: i4_1d, repeats: b1_1d):
+    """Mark the faces that name a vertex twice; return whether there is one.
+
+    Args:
+        last_face: (V,) scratch, of −1.
+    """
     found = False
     for f in range(offsets.shape[0] - 1):
         repeats[f] = False
         for h in range(offsets[f], offsets[f + 1]):
-            for other in range(offsets[f], h):
-                if corners[h] == corners[other]:
-                    repeats[f] = found = True
+            if last_face[corners[h]] == f:
+                repeats[f] = found = True
+            last_face[corners[h]] = f
     return found
 
 

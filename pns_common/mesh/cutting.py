@@ -183,35 +183,52 @@ def are_star_shaped(
 def _merged(triangles: list[list[int]], points: Float[np.ndarray, "n 2"]) -> list[list[int]]:
     """Join triangles across their sides, the longest first, as long as pieces stay convex.
 
-    Hertel and Mehlhorn 1983: at most four times as many pieces as the fewest.
+    Hertel and Mehlhorn 1983: at most four times as many pieces as the fewest. Pieces are rings of
+    linked sides, of which side k starts at ``origin[k]``: joining two takes O(1).
     """
     xy = points.tolist()
+    origin = [corner for triangle in triangles for corner in triangle]
+    after = [k + 1 - 3 * (k % 3 == 2) for k in range(len(origin))]
+    before = [k - 1 + 3 * (k % 3 == 0) for k in range(len(origin))]
+    side_at = {(origin[k], origin[after[k]]): k for k in range(len(origin))}
+    # Of each triangle the piece that it is in, or one on the way there; of each piece a side.
+    piece = list(range(len(triangles)))
+    first = [3 * t for t in piece]
 
     def turns_left(a: int, b: int, c: int) -> bool:
         (x, y), (u, v) = ((xy[k][0] - xy[b][0], xy[k][1] - xy[b][1]) for k in (a, c))
         return u * y - v * x >= 0
 
-    piece_at = {
-        side: number
-        for number, ring in enumerate(triangles)
-        for side in zip(ring, [*ring[1:], ring[0]], strict=True)
-    }
-    rings = dict(enumerate(triangles))
-    shared = [(a, b) for a, b in piece_at if a < b and (b, a) in piece_at]
+    def piece_of(side: int) -> int:
+        t = side // 3
+        while piece[t] != t:
+            piece[t] = piece[piece[t]]
+            t = piece[t]
+        return t
+
+    shared = [(a, b) for a, b in side_at if a < b and (b, a) in side_at]
     shared.sort(key=lambda side: (-np.hypot(*(points[side[0]] - points[side[1]])), side))
     for a, b in shared:
-        left, right = piece_at[a, b], piece_at[b, a]
-        one, two = rings[left], rings[right]
-        # Both from b on: b … a of the left, a … b of the right, of which the ends are the same.
-        one = one[one.index(b) :] + one[: one.index(b)]
-        two = two[two.index(a) :] + two[: two.index(a)]
-        if turns_left(one[-2], a, two[1]) and turns_left(two[-2], b, one[1]):
-            joined = one + two[1:-1]
-            del rings[right]
-            rings[left] = joined
-            for side in zip(joined, [*joined[1:], joined[0]], strict=True):
-                piece_at[side] = left
-    return [*rings.values()]
+        left, right = side_at[a, b], side_at[b, a]
+        at_a, at_b = (before[left], after[right]), (before[right], after[left])
+        if all(
+            turns_left(origin[come], corner, origin[after[go]])
+            for corner, (come, go) in ((a, at_a), (b, at_b))
+        ):
+            for come, go in (at_a, at_b):
+                after[come], before[go] = go, come
+            kept = piece_of(left)
+            piece[piece_of(right)] = kept
+            first[kept] = at_b[1]
+    rings = list[list[int]]()
+    for t in range(len(triangles)):
+        if piece[t] == t:
+            ring, side = [origin[first[t]]], after[first[t]]
+            while side != first[t]:
+                ring.append(origin[side])
+                side = after[side]
+            rings.append(ring)
+    return rings
 
 
 def newell(

@@ -387,7 +387,8 @@ def build_topology(
     repeats, repeating = np.zeros(0, dtype=bool), False
     if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
-        repeating = kernels.mark_repeats(corners, offsets, repeats)
+        last_face = np.full(vertex_count, -1, dtype=np.int32)
+        repeating = kernels.mark_repeats(corners, offsets, last_face, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
     known = corners, face_of_corner, repeats if repeating else repeats[:0], half_edges
     blocks.run(

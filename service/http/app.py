@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.middleware.cors import CORSMiddleware
-from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import ServiceError
@@ -24,7 +23,7 @@ from ..workers.models import Catalogue
 from ..workers.pool import Workers
 from . import openapi, pages, problems, routes
 from .access.keys import Bearer, Entry, read_keys
-from .access.origins import Origins, hosts_of, is_loopback
+from .access.origins import Origins, is_loopback
 from .jobs import Service
 from .watch.journal import Journal
 from .watch.metrics import Metrics
@@ -67,13 +66,12 @@ def create_app(
     settings = settings or Settings()
     source = model if model is not None else settings.model
     warm = partial(warm_up or partial(jobs.warm_up, providers=settings.providers), source)
-    workers = Workers(settings.workers, settings.job_seconds, warm)
     metrics = Metrics()
+    workers = Workers(settings.workers, settings.job_seconds, warm, metrics.restart)
     service = Service(settings, workers, job, catalogue, metrics.job, metrics.catalogue)
     metrics.gauge("pns_requests_held", "Requests under way", lambda: service.places.taken.total())
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: workers.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or end", lambda: workers.held.total())
-    metrics.restarts(lambda: workers.restarts)
     tracer = tracer_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
@@ -85,7 +83,7 @@ def create_app(
             log.warning("open to everybody: no PNS_KEYS_FILE is set")
         if not is_loopback(settings.host):
             if not settings.hosts:
-                log.warning("asked under any name: no PNS_HOSTS are set")
+                log.warning("asked by address alone: no PNS_HOSTS are set")
             if not settings.proxies:
                 log.warning("no PNS_PROXIES are set: without a proxy it is for a trusted network")
         workers.start()
@@ -146,7 +144,7 @@ def around(
     app = routes
     if keys is not None:
         app = Bearer(app, keys)
-    app = Origins(app, settings.cors_origins)
+    app = Origins(app, settings)
     if settings.cors_origins:
         app = CORSMiddleware(
             app,
@@ -155,7 +153,6 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    app = TrustedHostMiddleware(app, hosts_of(settings), www_redirect=False)
     spans = [] if tracer is None else [partial(record, tracer)]
     app = Journal(app, metrics.request, *spans)
 

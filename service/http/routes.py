@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from contextlib import AsyncExitStack
 from typing import Annotated
 
@@ -13,7 +12,7 @@ from starlette.responses import Response
 from pns_common.scheme_names import BASE_SCHEMES
 
 from ..bodies import media
-from ..errors import BusyError, NoModelError
+from ..errors import NoModelError
 from ..settings import Settings
 from ..workers.models import ModelEntry
 from . import openapi
@@ -113,10 +112,6 @@ async def _subdivide(
         if is_stream:
             file_type = media.MEDIA_TYPES[parameters.format]
             return StreamAnswer(service, job, held.pop_all(), file_type)
-        try:
-            await unless_gone(request.receive, service.serve(job))
-        except asyncio.CancelledError as error:
-            # Uvicorn's way to say that the time after SIGTERM is over.
-            raise BusyError("the service shuts down", retry_after=5) from error
+        await unless_gone(request.receive, service.serve(job))
         file = job.report if is_report else job.answer
         return FileAnswer(service, job, held.pop_all(), kind, file)

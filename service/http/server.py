@@ -99,15 +99,16 @@ def _bound(settings: Settings) -> socket.socket:
 
 
 def check_model(settings: Settings) -> None:
-    """Load the served model where one is named. Raises StartError where it does not load."""
-    if settings.model is None:
+    """Load the served model if it or its providers are named. Raises StartError."""
+    if not settings.model_fields_set & {"model", "providers"}:
         return
     # This process is to load none.
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         try:
             pool.submit(hold_model, settings.model, settings.providers).result()
         except NoModelError as error:
-            raise StartError(f"PNS_MODEL (or --model): {error.detail}") from error
+            named = "PNS_PROVIDERS" if settings.model is None else "PNS_MODEL (or --model)"
+            raise StartError(f"{named}: {error.detail}") from error
 
 
 def configuration(app: FastAPI, settings: Settings) -> uvicorn.Config:

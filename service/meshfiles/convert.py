@@ -38,7 +38,7 @@ from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .mtl import nearby
 from .parts import with_group_normals
-from .refine_mesh_file import check_cost, faces_after, refine_mesh_file
+from .refine_mesh_file import check_cost, check_faces, faces_after, refine_mesh_file
 from .triangulate import in_star_shaped_pieces, triangulated
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def converted(
         written = _of_gltf(done.glb, done.report, target, limits)
         return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
     with course.stage("read", 0.0, 0.1):
-        mesh, scheme = _taken(read_within(data, kind, limits), options, model)
+        mesh, scheme = _taken(read_within(data, kind, limits), options, model, limits)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
         if NORMAL not in mesh.layers and options.normals == "auto":
@@ -302,8 +302,12 @@ def _map_of(mesh: MeshFile, target: str) -> Arrays:
     return matrix_arrays(mesh.parents.take(mesh.corners) if target == "stl" else mesh.parents)
 
 
-def _taken(mesh: MeshFile, options: Options, model: Model | None) -> tuple[MeshFile, Scheme]:
+def _taken(
+    mesh: MeshFile, options: Options, model: Model | None, limits: Limits
+) -> tuple[MeshFile, Scheme]:
     """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
+    # Cutting leaves no fewer.
+    check_faces(mesh, options, limits)
     if not options.learns or (mesh.sizes != 3).any():
         scheme = polygon_scheme(options, model)
         if scheme is not None:

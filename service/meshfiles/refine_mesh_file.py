@@ -159,10 +159,16 @@ def faces_after(mesh: MeshFile, levels: int) -> int:
     return len(mesh.corners) * 4 ** (levels - 1)
 
 
-def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
-    """Check the refined faces and the memory that they will take. Raises LimitError."""
+def check_faces(mesh: MeshFile, options: Options, limits: Limits) -> int:
+    """Check and return the number of refined faces. Raises LimitError."""
     faces = faces_after(mesh, options.levels)
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
+    return faces
+
+
+def check_cost(mesh: MeshFile, options: Options, limits: Limits) -> None:
+    """Check the refined faces and the memory that they will take. Raises LimitError."""
+    faces = check_faces(mesh, options, limits)
     width = sum(layer.values.itemsize * layer.values.shape[1] for layer in mesh.layers.values())
     each = BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width + BYTES_FOR_LIMIT * options.limit
     kept = options.normals == "keep" or (options.normals == "auto" and options.crease != "off")

@@ -53,13 +53,20 @@ class Workers:
 
     Every process has a pebble pool of its own: a pool breaks with a process that dies idle, and
     breaks nothing which another request waits on. A pool whose job did not come back is thrown away
-    and replaced. `warm_up` is called in each new process before it takes jobs.
+    and replaced; `replaced` is told why. `warm_up` is called in each new process, before any job.
     """
 
-    def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        count: int,
+        seconds: float,
+        warm_up: Callable[[], object],
+        replaced: Callable[[str], None],
+    ) -> None:
         self._count = count
         self._seconds = seconds
         self._warm_up = warm_up
+        self._replaced = replaced
         self._most = max(1, count - 1)
         self._waiting: list[Turn] = []
         self._free: list[ProcessPool] = []
@@ -71,8 +78,6 @@ class Workers:
         self._stopping = False
         self.held: Counter[str] = Counter()
         """Number of workers by client, those that end its last job among them."""
-        self.restarts: Counter[str] = Counter()
-        """Number of replaced processes, by cause."""
 
     @property
     def ready(self) -> bool:
@@ -205,7 +210,7 @@ class Workers:
         """End a process and start another, which its client holds until it is there."""
         self._warm.discard(pool)
         if not self._stopping:
-            self.restarts[cause] += 1
+            self._replaced(cause)
             self._in_background(self._add(self._holders.pop(pool, ""), pool))
 
     async def _add(self, holder: str, instead: ProcessPool | None = None) -> None:
@@ -228,7 +233,7 @@ class Workers:
             except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
                 # What a disk had no room for, say, it may have soon.
                 log.warning("a worker did not start: %s", _reason(error))
-                self.restarts["start"] += 1
+                self._replaced("start")
                 await asyncio.sleep(RESTART_SECONDS)
                 instead = pool
                 continue

@@ -96,7 +96,7 @@ def test_a_slow_head_is_the_proxys_to_end_and_the_service_never_hears_of_it(prox
     address, lines, _ = proxy
     del lines[:]
     with socket.create_connection(address, timeout=600) as connection:
-        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: a\r\nX-")
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-")
         pieces = iter(lambda: connection.recv(4096), b"")
         with suppress(ConnectionResetError):
             assert b"200 OK" not in b"".join(pieces)
@@ -106,7 +106,7 @@ def test_a_slow_head_is_the_proxys_to_end_and_the_service_never_hears_of_it(prox
 def test_a_body_that_stops_is_the_proxys_to_end(proxy):
     with socket.create_connection(proxy[0], timeout=600) as connection:
         connection.sendall(
-            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
             b"Content-Length: 100\r\n\r\nhalf"
         )
         with suppress(ConnectionResetError):
@@ -143,7 +143,7 @@ def answers(address, requests, size=12):
 
 def test_one_address_has_so_many_connections_and_no_more(proxy):
     address, _, _ = proxy
-    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n"
+    upload = "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n"
     said = answers(address, [upload] * 40, size=4096)
     (refused, *_) = (answer for answer in said if answer.startswith(b"HTTP/1.1 429"))
     assert json.loads(refused.partition(b"\r\n\r\n")[2])["code"] == "too-many-requests"
@@ -152,7 +152,9 @@ def test_one_address_has_so_many_connections_and_no_more(proxy):
 def test_a_subscribers_ipv6_addresses_are_one(proxy):
     """One subscriber has as many addresses as it likes."""
     address, _, _ = proxy
-    upload = "POST /subdivide HTTP/1.1\r\nHost: a\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
+    upload = (
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nX-Client: {}\r\nContent-Length: 100\r\n\r\n"
+    )
     clients = [f"2001:db8:0:1::{host:x}" for host in range(40)]
     assert b"HTTP/1.1 429" in answers(address, [upload.format(client) for client in clients])
     answer, _ = ask(address, "GET", "/limits", headers={"X-Client": "2001:db8:0:2::1"})
@@ -193,7 +195,7 @@ def test_a_body_in_countless_pieces_comes_to_the_service_in_one(proxy):
     """Its parser of HTTP would be busy with them for seconds."""
     with socket.create_connection(proxy[0], timeout=600) as connection:
         connection.sendall(
-            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
             b"Connection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
             + b"1\r\nx\r\n" * 50_000
             + b"0\r\n\r\n"
@@ -207,7 +209,7 @@ def test_half_a_body_never_reaches_the_service(proxy):
     del lines[:]
     with socket.create_connection(address, timeout=600) as sender:
         sender.sendall(
-            b"POST /subdivide HTTP/1.1\r\nHost: a\r\nContent-Type: model/gltf-binary\r\n"
+            b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
             b"Content-Length: 2000000\r\n\r\n" + bytes(10**6)
         )
     assert "/subdivide" not in [line["route"] for line in heard(address, lines)]

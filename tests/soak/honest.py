@@ -55,7 +55,7 @@ def honest(
             ended.wait(min(retry, 2))
         elif status:
             tally.mistake(f"{sample.name}: {status}")
-        ended.wait(rng.uniform(0, 0.2))
+        ended.wait(rng.uniform(0, 0.1))
 
 
 def _ask(address: Address, sample: Sample) -> tuple[int, str, float]:
@@ -91,7 +91,7 @@ def large(address: Address, body: bytes, tally: Tally, ended: threading.Event) -
             tally.answer("large", answer.status)
             if answer.status in (429, 503):
                 ended.wait(min(float(answer.headers.get("Retry-After", 1)), 5))
-        ended.wait(0.1)
+        ended.wait(2)
 
 
 def slow(address: Address, samples: list[Sample], tally: Tally, ended: threading.Event) -> None:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 
@@ -56,12 +57,11 @@ def soak(
     known = samples()
     small = small_sample()
     clients = [
-        lambda: honest.honest(address, known, tally, ended, 1),
-        lambda: honest.honest(address, known, tally, ended, 2),
-        lambda: honest.honest(address, [small], tally, ended, 3),
+        *(partial(honest.honest, address, known, tally, ended, seed) for seed in (1, 2, 3)),
+        *(partial(honest.honest, address, [small], tally, ended, seed) for seed in (4, 5, 6)),
         lambda: honest.large(address, large_body(), tally, ended),
         lambda: honest.slow(address, known, tally, ended),
-        lambda: honest.leaving(address, known, tally, ended, 4),
+        lambda: honest.leaving(address, known, tally, ended, 7),
     ]
     threads = [threading.Thread(target=client) for client in clients]
     with ExitStack() as stack:

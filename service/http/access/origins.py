@@ -1,9 +1,10 @@
-"""Origins: which pages may have a visitor's browser ask for work.
+"""Origins and hosts: which pages may have a visitor's browser ask for work.
 
 A browser sends a form to any host that a page names, without asking first; only the answer is kept
 from the page. So any page could use up its visitors' budgets, or their own machines, where the
 service listens for them alone. A page whose own name is made to lead to this machine (DNS
-rebinding) has the same origin and host: so Starlette's TrustedHost checks the name, too.
+rebinding) has the same origin and host: so names are checked, too. An address and `localhost` are
+nobody's to lead elsewhere. Starlette's TrustedHost knows no addresses, which probes ask.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from .. import problems
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 # What a browser says of who asks: a page of this origin, or nobody but the user.
 OWN = frozenset({"same-origin", "none"})
-LOOPBACK_HOSTS = ("localhost", "*.localhost", "127.0.0.1", "[::1]")
 
 
 class ForeignOriginError(ServiceError):
@@ -32,35 +32,36 @@ class ForeignOriginError(ServiceError):
     title = "A page of another origin may not ask"
 
 
-def hosts_of(settings: Settings) -> tuple[str, ...]:
-    """Return the patterns of host names that are served; those of loopback where only it is bound.
+class UnknownHostError(ServiceError):
+    """The request names a host that the service is not called."""
 
-    Elsewhere any name is, unless they are listed: nobody knows what a network calls this machine.
-    """
-    if settings.hosts:
-        return settings.hosts
-    alone = is_loopback(settings.host) and not settings.proxies
-    host = f"[{settings.host}]" if ":" in settings.host else settings.host
-    return (*LOOPBACK_HOSTS, host) if alone else ("*",)
+    status = 400
+    code = "unknown-host"
+    title = "The service is not called by this name"
 
 
 def is_loopback(host: str) -> bool:
     """Return whether a host to listen on is reached from this machine alone."""
+    return ip_address(host).is_loopback if _is_address(host) else host == "localhost"
+
+
+def _is_address(host: str) -> bool:
     try:
-        return ip_address(host).is_loopback
+        return bool(ip_address(host))
     except ValueError:
-        return host == "localhost"
+        return False
 
 
 class Origins:
-    """ASGI layer that refuses work that foreign pages ask for.
+    """ASGI layer that refuses foreign names, and work that foreign pages ask for.
 
     Clients that are no browsers send no origin, and are not asked for one.
     """
 
-    def __init__(self, app: ASGIApp, named: tuple[str, ...]) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
-        self.named = frozenset(named)
+        self.named = frozenset(settings.cors_origins)
+        self.hosts = ("localhost", "*.localhost", settings.host.lower(), *settings.hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -74,10 +75,20 @@ class Origins:
 
     def _check(self, method: str, sent: dict[bytes, str]) -> None:
         host = _host(f"//{sent.get(b'host', '')}")
+        # HTTP/1.0 may leave it out; browsers do not.
+        if b"host" in sent and not self._is_own(host):
+            raise UnknownHostError(
+                "the Host is no address, not localhost, and none of the names in PNS_HOSTS"
+            )
         if method not in SAFE and not self._may_ask(sent, host):
             raise ForeignOriginError(
                 "a page of another origin asks; PNS_CORS_ORIGINS names those that may"
             )
+
+    def _is_own(self, host: str) -> bool:
+        return _is_address(host) or any(
+            host == name or (name[0] == "*" and host.endswith(name[1:])) for name in self.hosts
+        )
 
     def _may_ask(self, sent: dict[bytes, str], host: str) -> bool:
         origin, site = sent.get(b"origin"), sent.get(b"sec-fetch-site")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
 from collections.abc import Callable
@@ -10,7 +11,9 @@ from dataclasses import asdict, dataclass
 from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from ...errors import BusyError
 from ...log_lines import HEADER, REQUEST_ID, id_of
+from .. import problems
 from ..access.clients import Client
 
 log = logging.getLogger("pns.request")
@@ -87,6 +90,11 @@ class Journal:
 
         try:
             await self.app(scope, counted_receive, counted_send)
+        except asyncio.CancelledError:
+            # Uvicorn's way to say that the time after SIGTERM is over; it cuts off what has begun.
+            if not status:
+                over = BusyError("the service shuts down", retry_after=5)
+                await problems.of_service_error(over)(scope, receive, counted_send)
         except BaseException:
             status = status or 500
             raise

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
-from collections import Counter as Tally
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
-from pathlib import Path
 
 from prometheus_client import (
     CollectorRegistry,
@@ -21,8 +18,6 @@ from prometheus_client import (
     ProcessCollector,
     start_http_server,
 )
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
-from prometheus_client.registry import Collector
 
 from ...workers.models import Catalogue
 from ..jobs import Job
@@ -50,13 +45,13 @@ class Metrics:
         text = "Seconds that a job waited"
         self._queue_seconds = histogram("pns_queue_seconds", text, buckets=SECONDS)
         self._faces = counter("pns_faces", "Faces that came in and went out", ["direction"])
+        self._restarts = counter("pns_worker_restarts", "Workers replaced", ["cause"])
         runs = {"version": version("pns-subdivision"), "python": platform.python_version()}
         Info("pns_build", "What runs", registry=own).info(runs)
         labels = ["name", "hash", "default"]
         self._model = Gauge("pns_model_info", "The models that are served", labels, registry=own)
         ProcessCollector(registry=own)
         PlatformCollector(registry=own)
-        self.registry.register(_WorkerMemory())
 
     def request(self, entry: Entry) -> None:
         """Count a request; the journal calls this."""
@@ -86,50 +81,11 @@ class Metrics:
         """Show a number that is asked for at each scrape."""
         Gauge(name, text, registry=self.registry).set_function(value)
 
-    def restarts(self, counts: Callable[[], Tally[str]]) -> None:
-        """Show how often workers were replaced, by cause."""
-        self.registry.register(_Restarts(counts))
+    def restart(self, cause: str) -> None:
+        """Count a worker that is replaced."""
+        self._restarts.labels(cause).inc()
 
     def serve(self, host: str, port: int) -> int:
         """Serve them in a thread, by prometheus_client; return the port. Raises OSError."""
         server, _ = start_http_server(port, host, self.registry)
         return server.server_port
-
-
-class _Restarts(Collector):
-    def __init__(self, counts: Callable[[], Tally[str]]) -> None:
-        self._counts = counts
-
-    def collect(self) -> Iterable[Metric]:
-        family = CounterMetricFamily("pns_worker_restarts", "Workers replaced", labels=["cause"])
-        for name, count in self._counts().items():
-            family.add_metric([name], count)
-        yield family
-
-
-class _WorkerMemory(Collector):
-    """Memory of the worker processes; the server's own is in `process_resident_memory_bytes`."""
-
-    def collect(self) -> Iterable[Metric]:
-        family = GaugeMetricFamily(
-            "pns_worker_memory_bytes", "Resident memory of all worker processes"
-        )
-        family.add_metric([], sum(_resident(pid) for pid in _children()))
-        yield family
-
-
-def _children() -> Iterator[int]:
-    for path in Path("/proc/self/task").glob("*/children"):
-        try:
-            yield from map(int, path.read_text().split())
-        except OSError:
-            # The thread has ended meanwhile.
-            continue
-
-
-def _resident(pid: int) -> int:
-    try:
-        pages = Path(f"/proc/{pid}/statm").read_text().split()[1]
-    except OSError:
-        return 0
-    return int(pages) * os.sysconf("SC_PAGE_SIZE")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from service.bodies.media import GLB, GLTF, ZIP, sniff
-from service.bodies.multipart import MAX_PARTS, MultipartError, sent_files
 from service.bodies.sibling_files import File
+from service.bodies.uploads import MAX_PARTS, MultipartError, sent_files
 from service.errors import LimitError, MediaTypeError, ServiceError, UnreadableError
 
 TYPE = "multipart/form-data; boundary=X"

@@ -196,6 +196,8 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
     ("settings", "said"),
     [
         ({"PNS_MODEL": "nope"}, "PNS_MODEL (or --model): model nope: "),
+        ({"PNS_PROVIDERS": "Foo"}, "PNS_PROVIDERS: providers = ('Foo',): "),
+        ({"PNS_IGNORE_UNKNOWN": "maybe"}, "PNS_IGNORE_UNKNOWN: "),
         ({"PNS_HOSTS": "pns.example,a b"}, "PNS_HOSTS: 'a b' is no host name"),
     ],
 )

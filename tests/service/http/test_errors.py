@@ -63,13 +63,6 @@ def test_200_carries_the_answer_and_its_stages(client: TestClient) -> None:
     assert stages == ["upload", "queue", "read", "refine", "total"]
 
 
-def test_accept_json_asks_for_the_report(client: TestClient) -> None:
-    answer = post(client, b"{}", Accept="application/json")
-    assert answer.headers["content-type"] == "application/json"
-    both = post(client, b"{}", Accept="application/json, model/gltf-binary")
-    assert both.headers["content-type"] == "model/gltf-binary"
-
-
 @pytest.mark.parametrize(
     ("query", "name"),
     [
@@ -129,22 +122,17 @@ def test_422_for_a_parameter_given_twice(client: TestClient, query: str) -> None
         ("application/json, model/gltf-binary", "model/gltf-binary"),
         ("*/*", "model/gltf-binary"),
         ("image/png", "model/gltf-binary"),
+        ("application/octet-stream", "application/octet-stream"),
+        ("application/octet-stream;q=0.5, model/*", "model/gltf-binary"),
     ],
 )
 def test_the_answer_is_what_is_wanted_most(client: TestClient, accept: str, kind: str) -> None:
     assert post(client, b"{}", Accept=accept).headers["content-type"] == kind
-
-
-@pytest.mark.parametrize(
-    "query",
-    [
-        "levels=1&scheme=pns&budget=&reference_length=auto&diagnostics=summary",
-        "levels=2&scheme=loop&budget=0.5&reference_length=2.5&diagnostics=full",
-        "diagnostics=none",
-    ],
-)
-def test_documented_queries_are_taken(client: TestClient, query: str) -> None:
-    assert post(client, b"x", query).status_code == 200
+    lines = [*GLB.items(), ("Accept", "text/html"), ("Accept", accept)]
+    on_two = client.post("/subdivide", content=b"{}", headers=lines)
+    assert on_two.headers["content-type"] == kind
+    reported = client.post("/report", content=b"{}", headers=GLB | {"Accept": accept})
+    assert reported.headers["content-type"] == "application/json"
 
 
 def test_400_unreadable(client: TestClient) -> None:
@@ -283,44 +271,3 @@ def test_ready_and_healthy(client: TestClient) -> None:
     post(client, b"x")
     assert client.get("/readyz").json() == {"status": "ready"}
     assert client.get("/healthz").json() == {"status": "ok"}
-
-
-def test_the_description_names_bodies_parameters_and_errors(client: TestClient) -> None:
-    assert client.get("/docs").status_code == 200
-    operation = client.get("/openapi.json").json()["paths"]["/subdivide"]["post"]
-    assert set(operation["requestBody"]["content"]) == {
-        "model/gltf-binary",
-        "model/gltf+json",
-        "model/obj",
-        "model/ply",
-        "model/stl",
-        "model/off",
-        "application/zip",
-        "multipart/form-data",
-        "application/octet-stream",
-    }
-    names = {parameter["name"] for parameter in operation["parameters"]}
-    assert names == {
-        "levels",
-        "scheme",
-        "model",
-        "budget",
-        "reference_length",
-        "diagnostics",
-        "uv",
-        "normals",
-        "crease",
-        "border",
-        "polygons",
-        "material",
-        "group",
-        "weld",
-        "weld_tolerance",
-        "compress",
-        "format",
-        "limit",
-    }
-    statuses = {"200", "400", "401", "403", "408", "413", "415", "422", "429", "500", "503", "504"}
-    assert set(operation["responses"]) == statuses
-    for status in statuses - {"200"}:
-        assert set(operation["responses"][status]["content"]) == {"application/problem+json"}

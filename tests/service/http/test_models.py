@@ -100,19 +100,11 @@ def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")
 
 
-def test_another_models_budget_is_its_own_unless_it_is_given(client: TestClient) -> None:
-    assert report(client, "model=vertices&budget=0.75")["budget"] == 0.75
-
-
 @pytest.mark.parametrize("name", ["pape", "Paper", "./paper", "paper.onnx", "/etc/passwd", "../x"])
 @pytest.mark.parametrize("scheme", ["pns", "loop"])
 def test_422_for_what_is_no_models_name(client: TestClient, name: str, scheme: str) -> None:
     answer = subdivide(client, f"model={name}&scheme={scheme}")
     assert_unknown(answer, sorted({"broken", "paper", "vertices", DEFAULT_MODEL}))
-
-
-def test_422_for_a_model_given_twice(client: TestClient) -> None:
-    assert subdivide(client, "model=paper&model=paper").status_code == 422
 
 
 def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client: TestClient) -> None:

@@ -124,30 +124,6 @@ def test_one_operation_has_one_kind_of_answer(document):
     assert list(file)[:2] == ["application/octet-stream", "model/gltf-binary"]
 
 
-def test_an_answer_is_sent_as_what_was_asked_for():
-    app = create_app(Settings(workers=1), job=jobs.obey, warm_up=jobs.no_warm_up)
-    glb = {"Content-Type": "model/gltf-binary"}
-    with local(app) as client:
-        for accept, kind in (
-            ("*/*", "model/gltf-binary"),
-            ("application/octet-stream", "application/octet-stream"),
-            ("application/octet-stream;q=0.5, model/*", "model/gltf-binary"),
-            ("application/json", "application/json"),
-            ("multipart/mixed", "multipart/mixed"),
-        ):
-            answer = client.post("/subdivide", content=b"{}", headers=glb | {"Accept": accept})
-            assert answer.headers["content-type"].partition(";")[0] == kind
-        twice = [("Content-Type", "model/gltf-binary"), ("Accept", "text/html")]
-        answer = client.post(
-            "/subdivide", content=b"{}", headers=[*twice, ("Accept", "application/json")]
-        )
-        assert answer.headers["content-type"] == "application/json"
-        answer = client.post(
-            "/report", content=b"{}", headers=glb | {"Accept": "model/gltf-binary"}
-        )
-        assert answer.headers["content-type"] == "application/json"
-
-
 def generator():
     """openapi-python-client, from where `make` puts it or from the path."""
     program = ROOT / ".venv-clients" / "bin" / "openapi-python-client"

@@ -208,10 +208,12 @@ def test_the_deadline_ends_what_runs_and_its_worker() -> None:
         # Many times as long as the test needs.
         query = "levels=5&model=signed&compress=draco"
         under_way = begin_upload(server, part_glb(), query=query, whole=True)
+        sends = begin_upload(server, part_glb(), query=query)
         server.wait_until_a_job_runs()
         server.process.send_signal(signal.SIGTERM)
-        assert answered(under_way)[0] == 503
+        assert [answered(each)[0] for each in (under_way, sends)] == [503, 503]
         assert server.process.wait(HANGS) == 0
+    assert "Traceback" not in server.whole_log()
 
 
 @pytest.mark.parametrize("name", ["PNS_PORT", "PNS_METRICS_PORT"])

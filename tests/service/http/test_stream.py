@@ -171,7 +171,9 @@ def test_who_leaves_frees_its_worker_and_memory(
     until(lambda: client.post("/subdivide", content=b"here", headers=GLB).content == b"here")
 
 
-def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(tmp_path: Path) -> None:
+def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     """That is how a client knows that nothing more comes."""
     got: list[bytes] = []
     with served(workers=1, drain_seconds=1) as where:
@@ -191,3 +193,4 @@ def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(tmp_path:
     assert said.count(b"--" + boundary) >= 1
     assert b"--" + boundary + b"--" not in said
     assert not said.endswith(b"0\r\n\r\n")
+    assert not any(record.exc_info for record in caplog.records)

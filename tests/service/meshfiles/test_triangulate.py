@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from service.errors import LimitError
+from service.meshfiles import convert
 from service.meshfiles.mesh_file import MeshFile, offsets_of
 from service.meshfiles.triangulate import cut_polygons, triangulated
+from service.options import Limits, Options
 
 
 def cut(points: list, *polygons: list[int]) -> MeshFile:
@@ -123,3 +126,17 @@ def test_a_whisker_of_thousands_of_corners_is_cut_like_any_polygon() -> None:
     assert len(cut.places) == len(points) - 2
     assert (areas > 0).all()
     assert areas.sum() == pytest.approx(0.625)
+
+
+@pytest.mark.parametrize("scheme", ["loop", "catmull-clark"])
+def test_polygons_of_too_many_corners_are_refused_before_they_are_cut(
+    scheme: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for cutter in ("triangulated", "in_star_shaped_pieces"):
+        monkeypatch.setattr(convert, cutter, lambda mesh: pytest.fail("it was cut"))
+    data = b"v 0 0 0\nv 9 0 0\nv 1 1 0\nv 0 9 0\nf 1 2 3 4\n"
+    with pytest.raises(LimitError) as refused:
+        convert.converted(
+            data, "obj", "obj", Options(levels=3, scheme=scheme), None, Limits(max_faces=63)
+        )
+    assert (refused.value.allowed, refused.value.found) == (63, 64)

@@ -48,12 +48,6 @@ def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(tmp_pa
     assert serving(ZeroModel()).get("zero") == ZeroModel()
 
 
-def test_a_model_is_loaded_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    models = serving(None)
-    assert models.get("vertices") is models.get("vertices")
-    assert models.get(DEFAULT_MODEL) is models.get()
-
-
 @pytest.mark.parametrize("name", ["mine.onnx", "./paper", "models/paper.onnx", "paper.onnx", "x"])
 def test_a_path_is_no_name_even_of_the_served_file(tmp_path: Path, name: str) -> None:
     served_file(tmp_path / "x.onnx")

@@ -7,6 +7,7 @@ import os
 import platform
 import resource
 import signal
+from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from functools import partial
@@ -28,13 +29,21 @@ T = TypeVar("T")
 PAGE = resource.getpagesize()
 
 
+class Counted(Workers):
+    """Workers, and how many were replaced by cause."""
+
+    def __init__(self, count: int, seconds: float, warm_up: Callable[[], object]) -> None:
+        self.restarts: Counter[str] = Counter()
+        super().__init__(count, seconds, warm_up, lambda cause: self.restarts.update([cause]))
+
+
 @asynccontextmanager
 async def workers(
     count: int = 1,
     seconds: float = 30,
     warm_up: Callable[[], object] = jobs.nothing,
-) -> AsyncIterator[Workers]:
-    pool = Workers(count, seconds, warm_up)
+) -> AsyncIterator[Counted]:
+    pool = Counted(count, seconds, warm_up)
     pool.start()
     try:
         yield pool
