@@ -312,7 +312,11 @@ def _refine_to_goal(
     blocks = Blocks(_threads(threads))
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level = with_sharp_edges(level, kept, scheme)
-    tell = (lambda _: None) if progress is None else (lambda count: progress(0, max(count, 1)))
+
+    def tell(count: int) -> None:
+        if progress is not None:
+            progress(0, max(count, 1))
+
     first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
     made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
     if progress is not None:

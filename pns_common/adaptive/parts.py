@@ -170,7 +170,9 @@ class Levels:
         self, part: Part, active: Bool[np.ndarray, " V"], first_name: int
     ) -> tuple[Part, Refined, Integer[np.ndarray, " E"]]:
         """Refine what surrounds some vertices, and keep what surrounds them and new ones."""
-        near, vertices, edges = part.of_faces(active[part.topology.faces].any(axis=1))
+        near, vertices, edges = part.of_faces(
+            np.logical_or.reduce(active[part.topology.faces], axis=1)
+        )
         mesh, count = near.topology, near.topology.vertex_count
         names = first_name + np.arange(len(mesh.edges))
         topology = self.base.split(mesh, self.blocks, inherit=self.inherit(part.depth + 1))
@@ -184,7 +186,7 @@ class Levels:
         )
         seen = marked(topology.faces[finer.exists], topology.vertex_count)
         seen[:count] |= active[vertices]
-        made, kept, _ = finer.of_faces(seen[topology.faces].any(axis=1))
+        made, kept, _ = finer.of_faces(np.logical_or.reduce(seen[topology.faces], axis=1))
         of_edges = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
         of_edges[edges] = names
         return made, Refined(vertices, mesh, kept), of_edges

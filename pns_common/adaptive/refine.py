@@ -32,7 +32,7 @@ from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
 from pns_common.refinement import Refinement, Step, check_coordinates, reference_length_of
-from pns_common.report import limit_distances
+from pns_common.report import Report, limit_distances
 from pns_common.schemes.limit import limit_normals, limit_positions
 from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 
@@ -45,7 +45,7 @@ CHILD_CORNERS = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 5]])
 
 @dataclass(frozen=True, eq=False)
 class Trail:
-    """How values of control vertices become those of written ones.
+    """The way from values of control vertices to those of written ones.
 
     Attributes:
         steps: from each level to the next.
@@ -59,7 +59,12 @@ class Trail:
     rows: Integer[np.ndarray, " W"]
     levels: Levels
 
-    def carry(self, values: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+    @property
+    def count(self) -> int:
+        """Number of written vertices."""
+        return len(self.rows)
+
+    def __call__(self, values: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
         """Return values at the written vertices, by the base scheme's masks and limit masks."""
         made = np.zeros((int(self.rows.max(initial=-1)) + 1, values.shape[1]))
         base, blocks = self.levels.base, self.levels.blocks.quiet()
@@ -101,7 +106,9 @@ class Trail:
             if depth < len(self.steps):
                 trunk = follow(trunk, self.steps[depth])
         firsts = np.cumsum([0, *(part.shape[0] for part in parts)])
-        rows = np.concatenate([first + part.rows for first, part in zip(firsts, parts)])
+        rows = np.concatenate(
+            [first + part.rows for first, part in zip(firsts[:-1], parts, strict=True)]
+        )
         whole = SubdivisionMatrix(
             rows,
             np.concatenate([part.columns for part in parts]),
@@ -158,7 +165,7 @@ class AdaptiveRefinement(Refinement):
 
     def carry(self, values: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
         """Return values of vertices at the refined ones, as ``parents @ values``."""
-        return self.trail.carry(np.asarray(values, dtype=np.float64))
+        return self.trail(np.asarray(values, dtype=np.float64))
 
     def at_corners(self, values: Float[np.ndarray, "H K"]) -> Float[np.ndarray, "F 3 K"]:
         """Return values of the control mesh's corners at corners of faces, linear in each face."""
@@ -166,7 +173,7 @@ class AdaptiveRefinement(Refinement):
         return self.weights @ own[self.face_parents]
 
     @cached_property
-    def report(self) -> Any:
+    def report(self) -> Report:
         """Counts and diagnostics; see ``Report``."""
         learned = [step.report() for step in self.steps if step.added is not None]
         levels = np.bincount(self.face_levels)

@@ -1,4 +1,4 @@
-"""Which faces are split, and how neighbours of different levels meet.
+"""A tree of faces: those that are split, and cuts where neighbours of two levels meet.
 
 A face is split where its error is too large. Then, so that no vertex lies inside of another face's
 side, neighbours differ by one level at most: a face beside one that is split is cut in two, from
@@ -37,7 +37,7 @@ Codes = Sequence[Integer[np.ndarray, " _"]]
 
 @dataclass(frozen=True)
 class Goal:
-    """What a refinement is to reach; lengths in the mesh's units.
+    """The goal of a refinement; lengths in the mesh's units.
 
     Attributes:
         tolerance: no face is to be farther from the limit surface.
@@ -165,7 +165,7 @@ def sides_split(layer: Layer, split: Bool[np.ndarray, " F"]) -> Integer[np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What trees grow from.
+    """The start of trees: a control mesh, rules and a goal.
 
     Attributes:
         control: the control mesh, whose faces all exist.
@@ -257,7 +257,7 @@ class Start:
         rows = np.flatnonzero(faces)
         if len(rows) == 0:
             return
-        part, each = layer.part, CHILDREN**deeper
+        part, each = layer.part, int(CHILDREN**deeper)
         triangles = places[part.names[part.topology.faces[rows]]]
         of_finer = rows
         if finer is not None:

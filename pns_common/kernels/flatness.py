@@ -1,4 +1,4 @@
-"""How far a patch of a subdivision surface can be from a flat triangle.
+"""Bounds of the distance of patches of a subdivision surface from flat triangles.
 
 A patch lies in the convex hull of the control points that its masks read. In each of its points
 the triangle's own three have at least half of the weight, and what lies beyond edges of sharpness w
@@ -97,7 +97,7 @@ def measure_slabs(
     """
     for i in range(begin, end):
         p, q, r = row(triangles, 3 * i), row(triangles, 3 * i + 1), row(triangles, 3 * i + 2)
-        n, _, area = normal_and_area(p, q, r)
+        n, _, _ = normal_and_area(p, q, r)
         flat = n[0] != 0 or n[1] != 0 or n[2] != 0
         for k in range(COLUMNS):
             to[i, k] = 0.0

@@ -151,7 +151,7 @@ def _convert_one(
     made, triangles = f"{written.faces:,} faces", written.triangles
     made += f", {triangles:,} triangles," if triangles != written.faces else ""
     more = ""
-    if options.levels < MAX_LEVELS and not options.selects:
+    if options.levels < MAX_LEVELS and not (options.selects or options.goals):
         more = f"; --levels {options.levels + 1} would give {4 * triangles:,} triangles"
     console.print(f"{name}: {made} in {seconds:.1f} s{more}", markup=False)
 

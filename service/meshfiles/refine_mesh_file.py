@@ -57,9 +57,11 @@ def refine_mesh_file(
     if options.normals == "auto":
         smooth = options.crease == "off" and _is_flat(grouped)
         options = replace(options, normals="smooth" if smooth else "keep")
-    refine = refine_polygons if scheme.base.polygons else _refine_triangles
     try:
-        made = refine(grouped, scheme, options, course, traced=traced)
+        if scheme.base.polygons:
+            made = refine_polygons(grouped, scheme, options, course, traced=traced)
+        else:
+            made = _refine_triangles(grouped, scheme, options, limits, course, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if NORMAL not in mesh.layers and options.normals == "keep":
@@ -93,7 +95,13 @@ def _is_flat(mesh: MeshFile) -> bool:
 
 
 def _refine_triangles(
-    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    course: Course,
+    *,
+    traced: bool,
 ) -> Refined:
     parts, incomplete = parts_of(mesh)
     plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
@@ -102,7 +110,15 @@ def _refine_triangles(
     own = None if chosen is None else [chosen[part.faces] for part in parts]
     shares = stage_shares(scheme, options)
     made = refine_alone(
-        plan, primitives, scheme, options, course, shares, traced=traced, chosen=own
+        plan,
+        primitives,
+        scheme,
+        options,
+        course,
+        shares,
+        traced=traced,
+        chosen=own,
+        limits=limits,
     )
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")
