@@ -17,7 +17,6 @@ import pyvista
 from pns_common.interop.subdivide import subdivide
 from pns_common.mesh.mesh import Mesh
 from pns_common.operator.scheme import Scheme, loop
-from pns_common.refinement import DEFAULT_LEVELS
 
 
 @pyvista.register_dataset_accessor("pns", pyvista.PolyData)
@@ -28,12 +27,12 @@ class PnsAccessor:
         self._mesh = mesh
 
     def subdivide(
-        self, levels: int = DEFAULT_LEVELS, scheme: Scheme | None = None, **options: Any
+        self, levels: int | None = None, scheme: Scheme | None = None, **options: Any
     ) -> pyvista.PolyData:
         """Return the refined mesh; arguments and errors as of ``pns_common.subdivide``."""
         return subdivide(self._mesh, levels, scheme, **options)
 
-    def loop(self, levels: int = DEFAULT_LEVELS, **options: Any) -> pyvista.PolyData:
+    def loop(self, levels: int | None = None, **options: Any) -> pyvista.PolyData:
         """Return the mesh refined by Loop's rules alone."""
         return subdivide(self._mesh, levels, loop(), **options)
 

@@ -38,10 +38,14 @@ from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
 from pns_common.schemes.matrix import SubdivisionMatrix, subdivision_matrix
 
 DEFAULT_LEVELS, HIGHEST_LEVELS = 2, 16
+# With a tolerance, or the like, so many levels are used at most.
+DEFAULT_DEEPEST = 6
 # No refinement takes less for a face that it makes.
 LEAST_BYTES_PER_FACE = 60
 # Half-edges are numbered in 32 bits.
 LARGEST_INDEX = 2**31 - 1
+
+PROGRESS = "a function of two whole numbers, or None"
 
 keep_freed_memory()
 
@@ -90,10 +94,7 @@ class Refinement:
     @cached_property
     def reference_length(self) -> float:
         """R, the unit of length of the budget."""
-        first = self.steps[0].level
-        if first.reference_length is not None:
-            return first.reference_length
-        return measure_reference_length(first.points, first.topology.corners)
+        return reference_length_of(self.steps[0].level)
 
     @cached_property
     def report(self) -> Report:
@@ -144,9 +145,12 @@ class Refinement:
 def refine(
     mesh: Mesh,
     scheme: Scheme | str,
-    levels: SupportsIndex = DEFAULT_LEVELS,
+    levels: SupportsIndex | None = None,
     reference_length: float | str = "auto",
     *,
+    tolerance: float | str | None = None,
+    max_faces: int | None = None,
+    max_edge_length: float | str | None = None,
     limit: bool = True,
     creases: Integer[np.ndarray, "N 2"] | Creases | str | None = "auto",
     crease: Integer[np.ndarray, "N 2"] | Creases | str | None = "auto",
@@ -165,9 +169,16 @@ def refine(
             "catmull-clark" or "pns", the default model. The default model refines triangles by
             Loop's scheme; a mesh with other faces goes to its companion over Catmull–Clark.
         levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
+            None: 2, or with a tolerance or one of the next two 6, of which each face takes as many
+            as it needs.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
+        tolerance: split faces that may be farther from the limit surface, alone; in the mesh's
+            units, or a share of the diagonal of its box, as "0.1%". The result is an
+            ``AdaptiveRefinement``: faces of several levels, which meet without gaps. For triangles.
+        max_faces: split the faces of the largest distance first, and end before there are more.
+        max_edge_length: split faces with longer sides; as ``tolerance``.
         limit: put the last level's vertices where the base scheme would take them if it were
             applied for ever, and return the limit surface's normals there: then the number of
             levels says how fine the mesh is and no longer changes its shape. False: leave them as
@@ -193,6 +204,21 @@ def refine(
     """
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
+    if not (tolerance is None and max_faces is None and max_edge_length is None):
+        return _refine_to_goal(
+            mesh,
+            scheme,
+            levels,
+            reference_length,
+            (tolerance, max_faces, max_edge_length),
+            limit=limit,
+            creases=creases,
+            border=border,
+            faces=faces,
+            threads=threads,
+            progress=progress,
+        )
+    levels = DEFAULT_LEVELS if levels is None else levels
     children = len(mesh.corners) if scheme.base.polygons else 4 * mesh.face_count
     count = levels_that_fit(levels, children, QUAD if scheme.base.polygons else TRIANGLE)
     length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
@@ -249,6 +275,56 @@ def refine(
         limit_shift=shift,
         selected=selected,
     )
+
+
+def _refine_to_goal(
+    mesh: Mesh,
+    scheme: Scheme,
+    levels: SupportsIndex | None,
+    reference_length: float | str,
+    goals: tuple[Any, Any, Any],
+    *,
+    limit: bool,
+    creases: Integer[np.ndarray, "N 2"] | Creases | Literal["auto"] | None,
+    border: Literal["smooth", "corners", "fixed"] | None,
+    faces: Any,
+    threads: int | None,
+    progress: Callable[[int, int], None] | None,
+) -> Refinement:
+    """Refine a mesh of triangles until a goal is reached; arguments as of ``refine``."""
+    from pns_common.adaptive.refine import goal_of, refine_to_goal
+
+    given = "a tolerance, max_faces or max_edge_length"
+    if scheme.base.polygons:
+        expected = f"loop or pns on triangles with {given}: polygons are refined by whole levels"
+        raise ParameterError("scheme", scheme.name, expected=expected)
+    if scheme.rule is not None and scheme.learned_levels != 1:
+        expected = f"a model that acts at the first level alone with {given}"
+        raise ParameterError("scheme", str(scheme.model), expected=expected)
+    if limit is not True:
+        raise ParameterError("limit", limit, expected=f"True with {given}")
+    if faces is not None:
+        raise ParameterError("faces", "given", expected=f"None with {given}")
+    deepest = levels_given(DEFAULT_DEEPEST if levels is None else levels)
+    goal = goal_of(mesh, *goals)
+    length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
+    kept = chosen_creases(creases, scheme.creases)
+    kept = kept if border is None else replace(kept, border=border)
+    if progress is not None and not callable(progress):
+        raise ParameterError("progress", progress, expected=PROGRESS)
+    blocks = Blocks(_threads(threads))
+    level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
+    level = with_sharp_edges(level, kept, scheme)
+
+    def tell(count: int) -> None:
+        if progress is not None:
+            progress(0, max(count, 1))
+
+    first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
+    made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
+    if progress is not None:
+        progress(made.mesh.face_count, made.mesh.face_count)
+    return made
 
 
 def scheme_for(mesh: Mesh, scheme: Scheme | str) -> Scheme:
@@ -322,9 +398,16 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
         points = added.points
     else:
         points = level.base.place(level.points, level.topology, level.blocks)
-    _check_coordinates(points, level.blocks)
+    check_coordinates(points, level.blocks)
     kept = Level(level.points, level.topology, level.base, level.reference_length, level.blocks)
     return Step(kept, points, added)  # without measurements, which are most of the memory
+
+
+def reference_length_of(level: Level) -> float:
+    """Return R of a refinement that begins at a level."""
+    if level.reference_length is not None:
+        return level.reference_length
+    return measure_reference_length(level.points, level.topology.corners)
 
 
 def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None:
@@ -343,7 +426,8 @@ def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None
     return longest(placed[at] - smooth[at])
 
 
-def _check_coordinates(points: Float[np.ndarray, "W 3"], blocks: Blocks) -> None:
+def check_coordinates(points: Float[np.ndarray, "W 3"], blocks: Blocks) -> None:
+    """Raise MeshError where refined coordinates are too large, or not numbers."""
     sizes = blocks.quiet().run(
         len(points), lambda begin, end: kernels.largest_coordinate(points, begin, end)
     )
@@ -365,8 +449,7 @@ def levels_that_fit(given: SupportsIndex, children: int, degree: int) -> int:
         ParameterError: it is no whole number from 1 to 16, or so many refined faces cannot fit
             into the memory here, or cannot be numbered.
     """
-    if not (is_whole(given) and 1 <= (levels := int(given)) <= HIGHEST_LEVELS):
-        raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
+    levels = levels_given(given)
     made, there = children * 4 ** (levels - 1), memory_here()
     needed = made * LEAST_BYTES_PER_FACE
     if there is not None and needed > there:
@@ -375,6 +458,13 @@ def levels_that_fit(given: SupportsIndex, children: int, degree: int) -> int:
     if degree * made > LARGEST_INDEX:
         raise ParameterError("levels", levels, expected=f"fewer: {made:,} faces cannot be numbered")
     return levels
+
+
+def levels_given(given: SupportsIndex) -> int:
+    """Return a number of levels as int. Raises ParameterError: no whole number from 1 to 16."""
+    if not (is_whole(given) and 1 <= int(given) <= HIGHEST_LEVELS):
+        raise ParameterError("levels", given, expected=f"a whole number, 1 … {HIGHEST_LEVELS}")
+    return int(given)
 
 
 def _reference_length(mesh: Mesh, given: float | str, *, measured: bool) -> float | None:
@@ -407,5 +497,5 @@ def _progress(
     if tell is None:
         return None
     if not callable(tell):
-        raise ParameterError("progress", tell, expected="a function of two whole numbers, or None")
+        raise ParameterError("progress", tell, expected=PROGRESS)
     return Progress(children, levels, learned_levels, limit, tell)

@@ -101,6 +101,23 @@ class LimitDistances(TypedDict):
     limit_distance_bound: float
 
 
+class AdaptiveReport(TypedDict):
+    """Faces of several levels: the goal, in the mesh's units, and what was reached.
+
+    ``faces_by_level`` counts faces by how often the control face was split, and ``distance_max`` is
+    the largest bound of a face's distance from the limit surface: above ``tolerance`` only where
+    the deepest level did not suffice, or ``max_faces`` ended it.
+    """
+
+    tolerance: float | None
+    max_edge_length: float | None
+    max_faces: int | None
+    vertices: int
+    faces: int
+    faces_by_level: list[int]
+    distance_max: float
+
+
 class Report(LimitDistances):
     """The report of a refinement. The same input gives the same report.
 
@@ -118,6 +135,7 @@ class Report(LimitDistances):
     reference_length: float
     multi_fan_vertices: int
     levels: list[LevelReport]
+    adaptive: NotRequired[AdaptiveReport]
 
 
 @dataclass(frozen=True)

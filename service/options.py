@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from pns_common.scheme_names import BASE_SCHEMES
 
@@ -33,6 +33,9 @@ MAX_WELD_TOLERANCE = 0.01
 # `angle:` is followed by degrees.
 CREASE_PATTERN = r"auto|off|normals|angle:\d{1,3}(\.\d{1,6})?"
 
+# A length in the file's units, or a share of the mesh's diagonal; empty: none.
+LENGTH_PATTERN = r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?%?"
+
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
 
@@ -43,7 +46,9 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface, with its normals; `polygons` joins triangles of a glTF;
+    vertices on the limit surface, with its normals; `tolerance`, `max_faces` and `max_edge_length`
+    refine faces only where that is needed, by up to MAX_LEVELS levels whatever `levels` are;
+    `polygons` joins triangles of a glTF;
     `material` and `group` name the faces to refine (None: all). Raises InvalidParameter.
     """
 
@@ -63,6 +68,9 @@ class Options:
     group: str | None = None
     compress: Compression = "none"
     limit: bool = True
+    tolerance: str | None = None
+    max_faces: int | None = None
+    max_edge_length: str | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
@@ -98,6 +106,42 @@ class Options:
         if self.weld_tolerance and self.weld != "position":
             raise InvalidParameter("weld_tolerance", "weld_tolerance needs weld=position")
 
+        self._check_goals()
+
+    def _check_goals(self) -> None:
+        """Check what faces of several levels are asked for. Raises InvalidParameter."""
+        for name in ("tolerance", "max_edge_length"):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            if not re.fullmatch(LENGTH_PATTERN, given) or float(given.rstrip("%")) <= 0:
+                expected = "must be a length above 0, or a share of the diagonal, as in 0.1%"
+                raise InvalidParameter(name, f"{name} is {given}; it {expected}")
+        if self.max_faces is not None and self.max_faces < 1:
+            raise InvalidParameter(
+                "max_faces", f"max_faces is {self.max_faces}; it must be above 0"
+            )
+        if not self.goals:
+            return
+        with_goal = f"with {', '.join(self.goals)}"
+        wrong = {
+            "scheme": self.scheme == "catmull-clark" and "polygons are refined by whole levels",
+            "uv": self.uv == "smooth" and "texture coordinates are linear",
+            "polygons": self.polygons != "off" and "triangles stay triangles",
+            "limit": not self.limit and "vertices are on the limit surface",
+            "material": self.material is not None and "all faces are refined",
+            "group": self.group is not None and "all faces are refined",
+        }
+        for name, reason in wrong.items():
+            if reason:
+                raise InvalidParameter(name, f"{with_goal} {reason}: leave {name} out")
+
+    @property
+    def goals(self) -> dict[str, Any]:
+        """Goals of faces of several levels, as arguments of the library's refine."""
+        names = ("tolerance", "max_faces", "max_edge_length")
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
     @property
     def learns(self) -> bool:
         """True if a model is asked for, if only for meshes of triangles."""
@@ -122,7 +166,8 @@ class Options:
 
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
-    "levels": f"how fine, 1 to {MAX_LEVELS}: each level makes four faces of one",
+    "levels": f"how fine, 1 to {MAX_LEVELS}: each level makes four faces of one. "
+    "Without effect with tolerance, max_faces or max_edge_length",
     "scheme": "the rules. auto and pns: the learned ones; of polygons that the model has no rules "
     "for auto makes quads by Catmull-Clark, and pns triangles. loop: the classic rules for "
     "triangles; polygons are cut. catmull-clark: the classic rules for polygons",
@@ -155,6 +200,11 @@ DESCRIPTIONS = {
     "normals and UVs are rounded",
     "limit": "put each vertex where endless refinement would take it, on the limit surface: then "
     "more levels give a finer mesh of one shape. Off: control points for further refinement",
+    "tolerance": "refine faces only where they may be farther from the limit surface, by up to "
+    f"{MAX_LEVELS} levels: a length in the file's units, or as in 0.1% a share of each mesh's "
+    "diagonal. Polygons are cut into triangles",
+    "max_faces": "most faces of each mesh: those farthest from the limit surface are refined first",
+    "max_edge_length": "refine faces only where their sides are longer; as tolerance",
 }
 
 

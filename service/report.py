@@ -95,7 +95,8 @@ def build_report(
     refined = [result.report for result in results if result.report is not None]
     totals = [
         total_level([report["levels"][level] for report in refined])
-        for level in range(levels if refined else 0)
+        for level in range(min([levels, *(len(report["levels"]) for report in refined)]))
+        if refined
     ]
     bends = sum((result.bends for result in results), NO_BENDS)
     return {
@@ -213,4 +214,5 @@ def _mesh(result: MeshResult) -> dict[str, Any]:
         "degenerate_faces": result.degenerate,
         "copied_faces": result.copies,
         "levels": [] if report is None else report["levels"],
+        **({} if report is None or "adaptive" not in report else {"adaptive": report["adaptive"]}),
     }

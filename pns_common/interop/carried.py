@@ -14,8 +14,11 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.carry.carried import Carried, Column, Columns, rule_for
+from pns_common.adaptive.corners import Blend, join_corners
+from pns_common.adaptive.refine import AdaptiveRefinement
+from pns_common.carry.carried import Carried, Column, Columns, in_type_of, rule_for
 from pns_common.carry.carried import refine_carried as refine_columns
+from pns_common.carry.rules import linear
 from pns_common.errors import ParameterError
 from pns_common.mesh.creases import Creases, one_of_creases
 from pns_common.mesh.mesh import Mesh
@@ -57,7 +60,10 @@ class CarriedMesh:
 
 
 def refine_carried(
-    mesh: CarriedMesh, scheme: Scheme | str, levels: SupportsIndex, options: Mapping[str, Any]
+    mesh: CarriedMesh,
+    scheme: Scheme | str,
+    levels: SupportsIndex | None,
+    options: Mapping[str, Any],
 ) -> tuple[CarriedMesh, Refinement]:
     """Return the refined mesh with its data, and the refinement of the joined surface.
 
@@ -80,6 +86,8 @@ def refine_carried(
     options["creases"] = _renamed(creases, joined) if named else creases
     surface_faces = joined[given.corners], given.offsets
     refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
+    if isinstance(refinement, AdaptiveRefinement):
+        return _at_faces(mesh, given, joined, refinement), refinement
 
     blocks, base = Blocks(), refinement.scheme.base
     topologies = [given.topology()]
@@ -124,6 +132,53 @@ def _refined_lines(
     of_line = np.concatenate([of_part, parents[~known]])
     order = np.argsort(of_line, kind="stable")
     return made[order], of_line[order]
+
+
+def _at_faces(
+    mesh: CarriedMesh,
+    given: Mesh,
+    joined: Integer[np.ndarray, " V"],
+    made: AdaptiveRefinement,
+) -> CarriedMesh:
+    """Return faces of several levels with their data. Old vertices keep their numbers."""
+    parents, count = made.face_parents, len(given.vertices)
+    split = join_corners(made.mesh.faces, given.faces[parents], made.weights)
+    rows = split.blend.rows
+    old = np.maximum.reduce(split.blend.weights, axis=1) == 1
+    number = np.where(
+        old,
+        np.take_along_axis(rows, split.blend.weights.argmax(axis=1)[:, None], axis=1)[:, 0],
+        count + np.cumsum(~old) - 1,
+    )
+    every = np.arange(count)
+    kept = Blend(
+        np.concatenate([every[:, None].repeat(3, axis=1), rows[~old]]),
+        np.concatenate([np.eye(3)[[0] * count], split.blend.weights[~old]]),
+    )
+    at_corners = Blend(
+        (3 * parents[:, None] + np.arange(3)).repeat(3, axis=0), made.weights.reshape(-1, 3)
+    )
+    corners = dict[str, np.ndarray]()
+    for name, values in mesh.corners.items():
+        own = _blended(at_corners, _flat(values, given))
+        corners[name] = own.reshape(-1, 3, *own.shape[1:])
+    vertices = np.concatenate([joined, split.vertex[~old]])
+    return CarriedMesh(
+        made.mesh.vertices[vertices],
+        number[split.faces],
+        {name: _blended(kept, values) for name, values in mesh.points.items()},
+        corners,
+        {name: values[parents] for name, values in mesh.cells.items()},
+    )
+
+
+def _blended(blend: Blend, values: np.ndarray) -> np.ndarray:
+    rows = values.reshape(len(values), -1)
+    if rule_for(values) is linear:
+        made = in_type_of(values, blend.linear(rows))
+    else:
+        made = blend.nearest(rows)
+    return made.reshape(len(made), *values.shape[1:])
 
 
 def _columns(data: Data) -> Columns:

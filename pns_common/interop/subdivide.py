@@ -21,7 +21,7 @@ from pns_common.interop.of_trimesh import read_trimesh, write_trimesh
 from pns_common.mesh.mesh import Mesh
 from pns_common.model.file import load_model
 from pns_common.operator.scheme import Scheme, pns
-from pns_common.refinement import DEFAULT_LEVELS, refine, scheme_for
+from pns_common.refinement import refine, scheme_for
 
 AnyMesh = TypeVar("AnyMesh")
 Kind = TypeVar("Kind")
@@ -84,7 +84,7 @@ COLLECTIONS = MappingProxyType(
 
 def subdivide(
     mesh: AnyMesh,
-    levels: SupportsIndex = DEFAULT_LEVELS,
+    levels: SupportsIndex | None = None,
     scheme: Scheme | str | None = None,
     *,
     triangulate: bool = False,
@@ -99,7 +99,7 @@ def subdivide(
             Meshes of a library keep texture coordinates, colours and other data, interpolated
             linearly; their vertices at the same position are one vertex of the surface, unless
             ``weld="index"`` is among the options. A pair and a ``Mesh`` are refined as they are.
-        levels: number of steps, 1 … 16.
+        levels: number of steps, 1 … 16; None: 2, or 6 at most with a tolerance or the like.
         scheme: as for ``refine``; None for ``pns(load_model())``, which takes polygons too.
         triangulate: cut polygons into triangles first, which is right for convex ones.
         options: further arguments of ``refine``: ``reference_length``, ``crease`` (or ``creases``:

@@ -72,7 +72,7 @@ def _hash(words: UInt[np.ndarray, "N W"]) -> UInt[np.ndarray, " N"]:
     return mixed
 
 
-def marked(rows: Integer[np.ndarray, " N"], count: int) -> Bool[np.ndarray, " S"]:
+def marked(rows: Integer[np.ndarray, "*N"], count: int) -> Bool[np.ndarray, " S"]:
     """Return which of ``count`` rows are named, however often."""
     marks = np.zeros(count, dtype=bool)
     marks[rows] = True

@@ -74,15 +74,15 @@ def subdivision_matrix(
     to the refined mesh: ``limit_positions``.
     """
     blocks = blocks or Blocks()
-    made = _mask_matrix(topologies[0], base.place, blocks)
+    made = mask_matrix(topologies[0], base.place, blocks)
     for topology in topologies[1:]:
-        made = _product(_mask_matrix(topology, base.place, blocks), made)
+        made = product(mask_matrix(topology, base.place, blocks), made)
     if at_last is not None:
-        made = _product(_mask_matrix(base.split(topologies[-1], blocks), at_last, blocks), made)
+        made = product(mask_matrix(base.split(topologies[-1], blocks), at_last, blocks), made)
     return made
 
 
-def _mask_matrix(topology: Topology, place: Place, blocks: Blocks) -> SubdivisionMatrix:
+def mask_matrix(topology: Topology, place: Place, blocks: Blocks) -> SubdivisionMatrix:
     """Return the matrix of masks whose rows read the corners of the faces around one vertex."""
     count = topology.vertex_count
     order = np.argsort(topology.corners, kind="stable")
@@ -106,7 +106,8 @@ def _mask_matrix(topology: Topology, place: Place, blocks: Blocks) -> Subdivisio
     return SubdivisionMatrix(rows[order], columns[order], weights[order], (size, count))
 
 
-def _product(later: SubdivisionMatrix, earlier: SubdivisionMatrix) -> SubdivisionMatrix:
+def product(later: SubdivisionMatrix, earlier: SubdivisionMatrix) -> SubdivisionMatrix:
+    """Return the map that applies one map after another."""
     shape = (later.shape[0], earlier.shape[1])
     most = int(np.diff(earlier.starts)[later.columns].sum())
     starts, columns = np.empty(shape[0] + 1, dtype=np.int64), np.empty(most, dtype=np.int64)

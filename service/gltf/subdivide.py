@@ -213,7 +213,7 @@ def _refined(
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
     parents: Arrays = {}
     with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course, traced=traced):
+        for first in refined_meshes(upload, firsts, scheme, options, course, limits, traced=traced):
             with course.stage("write"):
                 written = into.replace_mesh(first.index, first.refined, course)
                 later = [first.of(mesh) for mesh in alike[first.index]]
@@ -279,6 +279,8 @@ def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
 
 def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
     """Return the scheme that refines polygons as such; None: they are cut into triangles."""
+    if options.goals:
+        return None
     if not options.learns or model is not None:
         made = make_scheme(options, model)
         if made.base.polygons or made.for_polygons is not None:

@@ -10,7 +10,14 @@ from pydantic import BeforeValidator, ConfigDict, Field, create_model
 from pydantic_core import PydanticCustomError
 
 from ..bodies.media import Kind
-from ..options import CREASE_PATTERN, DESCRIPTIONS, MAX_LEVELS, MAX_WELD_TOLERANCE, Options
+from ..options import (
+    CREASE_PATTERN,
+    DESCRIPTIONS,
+    LENGTH_PATTERN,
+    MAX_LEVELS,
+    MAX_WELD_TOLERANCE,
+    Options,
+)
 
 
 def _empty_is_absent(value: Any) -> Any:
@@ -32,6 +39,9 @@ def _length(value: Any) -> float | Literal["auto"]:
 
 
 _Name = Annotated[str | None, BeforeValidator(_empty_is_absent)]
+_Length = Annotated[
+    Annotated[str, Field(pattern=f"^{LENGTH_PATTERN}$")] | None, BeforeValidator(_empty_is_absent)
+]
 # Where a type of `Options` does not say all that it refuses.
 _TYPES = get_type_hints(Options) | {
     "levels": Annotated[int, Field(ge=1, le=MAX_LEVELS)],
@@ -46,6 +56,9 @@ _TYPES = get_type_hints(Options) | {
     "crease": Annotated[str, Field(pattern=f"^({CREASE_PATTERN})$")],
     "weld_tolerance": Annotated[float, Field(ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)],
     "material": _Name,
+    "tolerance": _Length,
+    "max_faces": Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(_empty_is_absent)],
+    "max_edge_length": _Length,
     "group": _Name,
 }
 _SHARED: dict[str, Any] = {

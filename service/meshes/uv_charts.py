@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
@@ -23,7 +24,7 @@ from .split_connectivity import SplitConnectivity
 # How C corners at vertices (C,) of the mesh to refine spread their texture coordinates (C, 2) over
 # (N, 2).
 UvBlend = Callable[
-    [SplitConnectivity, Int[np.ndarray, " C"], Shaped[np.ndarray, "C 2"]], Float[np.ndarray, "N 2"]
+    [Any, Int[np.ndarray, " C"], Shaped[np.ndarray, "C 2"]], Float[np.ndarray, "N 2"]
 ]
 
 
@@ -38,7 +39,7 @@ def uv_blend(options: Options, creases: Creases, base: BaseScheme = LOOP) -> UvB
 
 
 def linear_uv(
-    connectivity: SplitConnectivity, vertex: Int[np.ndarray, " C"], uv: Shaped[np.ndarray, "C 2"]
+    connectivity: Any, vertex: Int[np.ndarray, " C"], uv: Shaped[np.ndarray, "C 2"]
 ) -> Float[np.ndarray, "N 2"]:
     """Blend linearly in each face of the control mesh: textures lie as they lay."""
     return connectivity.linear(uv)

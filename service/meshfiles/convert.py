@@ -156,7 +156,7 @@ def _convert_one(
     polygons = written.triangles != written.faces and job.target not in (*GLTF_KINDS, "stl")
     count, what = (written.faces, "faces") if polygons else (written.triangles, "triangles")
     more = ""
-    if options.levels < MAX_LEVELS and not options.selects:
+    if options.levels < MAX_LEVELS and not (options.selects or options.goals):
         more = f"; --levels {options.levels + 1} would give {4 * count:,}"
     console.print(f"{name}: {count:,} {what} in {seconds:.1f} s{more}", markup=False)
 

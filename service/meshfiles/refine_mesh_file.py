@@ -60,9 +60,11 @@ def refine_mesh_file(
     if options.normals == "auto":
         smooth = options.crease == "off" and _is_flat(grouped)
         options = replace(options, normals="smooth" if smooth else "keep")
-    refine = refine_polygons if scheme.base.polygons else _refine_triangles
     try:
-        made = refine(grouped, scheme, options, course, traced=traced)
+        if scheme.base.polygons:
+            made = refine_polygons(grouped, scheme, options, course, traced=traced)
+        else:
+            made = _refine_triangles(grouped, scheme, options, limits, course, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if NORMAL not in mesh.layers and options.normals == "keep":
@@ -96,7 +98,13 @@ def _is_flat(mesh: MeshFile) -> bool:
 
 
 def _refine_triangles(
-    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    course: Course,
+    *,
+    traced: bool,
 ) -> Refined:
     parts, incomplete = parts_of(mesh)
     plan = MeshPlan(0, tuple(range(len(parts))), len(mesh.faces))
@@ -114,6 +122,7 @@ def _refine_triangles(
         traced=traced,
         chosen=own,
         stated=_stated(mesh, options),
+        limits=limits,
     )
     if made.report is None:
         raise UnrefinableError("no face has three different vertices")

@@ -21,7 +21,7 @@ from pns_common.parallel import Blocks, available_threads
 
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
+from ...meshes.split_connectivity import blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
@@ -59,7 +59,7 @@ class RefinedPrimitive:
 
 
 @dataclass(frozen=True, eq=False)
-class _Vertices:
+class Vertices:
     """The N refined vertices of a primitive.
 
     Attributes:
@@ -74,7 +74,7 @@ class _Vertices:
 
     row: Int[np.ndarray, " C"]
     vertex: Int[np.ndarray, " C"]
-    connectivity: SplitConnectivity
+    connectivity: Blending
     positions: Float[np.ndarray, "N 3"]
     normals: Float[np.ndarray, "N 3"] | None
     exact_normals: Float[np.ndarray, "N 3"] | None
@@ -123,11 +123,11 @@ def refined_primitives(
                 before = None
                 if control.authored or control.own is not None:
                     before = control.primitives[number].corners[control.kept[number]]
-                made.append(_facing(each, before))
+                made.append(facing(each, before))
     return made
 
 
-def _facing(refined: RefinedPrimitive, before: Int[np.ndarray, "P 3"] | None) -> RefinedPrimitive:
+def facing(refined: RefinedPrimitive, before: Int[np.ndarray, "P 3"] | None) -> RefinedPrimitive:
     """Return a refined primitive of which no normal points away from its face's front.
 
     At a child face that turned over, the normal and its tangent are mirrored, in a row of their
@@ -212,7 +212,7 @@ def _refined_primitive(
         if primitive.is_double
         else rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid))
     )
-    vertices = _Vertices(
+    vertices = Vertices(
         row=row,
         vertex=control.cleaned.vertex_map[welded[row]],
         connectivity=own,
@@ -222,9 +222,10 @@ def _refined_primitive(
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,
     )
-    attributes = _attributes(primitive, vertices, uv_blend)
+    attributes = refined_attributes(primitive, vertices, uv_blend)
     targets = [
-        _target(primitive, vertices, attributes, target) for target in range(len(primitive.targets))
+        refined_target(primitive, vertices, attributes, target)
+        for target in range(len(primitive.targets))
     ]
     for name, values in refined.scalars.items():
         attributes[name] = values[vertex, None].astype(np.float32)
@@ -244,7 +245,9 @@ def _refined_primitive(
     return RefinedPrimitive(primitive, faces, attributes, targets, vertex[used], counts)
 
 
-def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvBlend) -> Columns:
+def refined_attributes(
+    primitive: TrianglePrimitive, vertices: Vertices, uv_blend: UvBlend
+) -> Columns:
     """Return the refined attributes in the file's order, in their component types."""
     skin: Columns = {}
     if vertices.skin_and_morph.binding is not None:
@@ -269,8 +272,8 @@ def _attributes(primitive: TrianglePrimitive, vertices: _Vertices, uv_blend: UvB
     return refined
 
 
-def _target(
-    primitive: TrianglePrimitive, vertices: _Vertices, base: Columns, number: int
+def refined_target(
+    primitive: TrianglePrimitive, vertices: Vertices, base: Columns, number: int
 ) -> Columns:
     """Return the refined deltas of a morph target; `base` are the refined attributes."""
     own, refined, normals = vertices.connectivity, Columns(), vertices.morphed_normals[number]

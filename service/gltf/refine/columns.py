@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
@@ -29,6 +29,8 @@ from ..read.accessors import as_float
 from ..read.primitives import TrianglePrimitive
 
 if TYPE_CHECKING:
+    from pns_common.adaptive.refine import AdaptiveRefinement
+
     from .control_mesh import ControlMesh, Parts
 
 POSITION = "POSITION"
@@ -44,6 +46,19 @@ _SET = re.compile(r"WEIGHTS_([0-9]+)")
 _NO_JOINT = np.iinfo(np.int64).max
 # Joints have at most two bytes.
 _JOINTS = 2**16
+
+
+class Linear(Protocol):
+    """A linear map of columns of vertices to those of ``count`` refined ones."""
+
+    @property
+    def count(self) -> int:
+        """Number of refined vertices."""
+        ...
+
+    def __call__(self, columns: Float[np.ndarray, "V K"], /) -> Float[np.ndarray, "W K"]:
+        """Refine columns."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +212,18 @@ def refined_skin_and_morph(
     return after, *_losses(after.lost, part_after, parts.count)
 
 
+def carried_skin_and_morph(
+    control: ControlMesh, made: AdaptiveRefinement, course: Course
+) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
+    """Refine skin and morph with faces of several levels; as ``refined_skin_and_morph``."""
+    if not control.skin_and_morph.any:
+        return control.skin_and_morph, np.zeros(1, dtype=np.int64), np.zeros(1)
+    before = control.skin_and_morph.take(control.vertex_rows())
+    slots = _common_slots(control, made.mesh.faces, made.trail.count, made.face_parents)
+    after = _refined(before, made.trail, slots, course)
+    return after, *_losses(after.lost, None, 1)
+
+
 def _losses(
     lost: Float[np.ndarray, " V"] | None, part: Int[np.ndarray, " V"] | None, count: int
 ) -> tuple[Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
@@ -212,7 +239,7 @@ def _losses(
 
 def _refined(
     before: SkinAndMorph,
-    linear: ColumnRefinement,
+    linear: Linear,
     slots: Int[np.ndarray, " V"] | None,
     course: Course,
 ) -> SkinAndMorph:
@@ -228,7 +255,7 @@ def _refined(
 
 
 def _refined_binding(
-    binding: Binding, linear: ColumnRefinement, slots: Int[np.ndarray, " V"] | None, course: Course
+    binding: Binding, linear: Linear, slots: Int[np.ndarray, " V"] | None, course: Course
 ) -> tuple[Binding, Float[np.ndarray, " V"]]:
     """Refine a binding; return also the share of its weight that each vertex lost.
 
@@ -283,7 +310,10 @@ def skin_attributes(
 
 
 def _common_slots(
-    control: ControlMesh, refined_faces: Int[np.ndarray, "G 3"], count: int
+    control: ControlMesh,
+    refined_faces: Int[np.ndarray, "G 3"],
+    count: int,
+    parents: Int[np.ndarray, " G"] | None = None,
 ) -> Int[np.ndarray, " V"] | None:
     """Return the number of joints that each refined vertex may keep; None if all have equal room.
 
@@ -301,7 +331,9 @@ def _common_slots(
     # Descendants are ordered like their faces, of polygons like their corners.
     if control.polygons is not None:
         of_face = np.repeat(of_face, np.diff(control.surface.offsets))
-    children = np.repeat(of_face, len(refined_faces) // len(of_face))
+    if parents is None:
+        parents = np.repeat(np.arange(len(of_face)), len(refined_faces) // len(of_face))
+    children = of_face[parents]
     np.minimum.at(at_vertices, refined_faces, children[:, None])
     return at_vertices
 

@@ -145,7 +145,7 @@ def refined_mesh(
             progress=lambda done, total: course.reach(done / total),
         )
         if not control.primitives[0].is_double:
-            _check_range(made.mesh)
+            check_range(made.mesh)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
     faces, levels, base = made.mesh.faces, made.topologies, made.scheme.base
@@ -183,7 +183,7 @@ def refined_union(
         limit=options.limit,
     )
     for each in made:
-        _check_range(each.mesh)
+        check_range(each.mesh)
     faces = disjoint_faces((each.mesh.faces, len(each.mesh.vertices)) for each in made)
     scalars = [_scalars(each, options) for each in made]
     normals = [each.normals for each in made if each.normals is not None]
@@ -245,7 +245,7 @@ def _jobs(
     return jobs
 
 
-def _check_range(mesh: Mesh) -> None:
+def check_range(mesh: Mesh) -> None:
     """Check that positions fit into float32. Raises MeshError."""
     low, high = extent(mesh.vertices)
     if max(-low.min(), high.max()) > np.finfo(np.float32).max:

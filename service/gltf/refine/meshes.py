@@ -18,10 +18,11 @@ from ...advice import NO_BENDS, count_bends
 from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
-from ...options import Options
+from ...options import Limits, Options
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
+from .adaptive import refine_to_goal
 from .attributes import RefinedPrimitive, refined_primitives
 from .changes import (
     changes_of_primitive,
@@ -60,6 +61,7 @@ def refined_meshes(
     scheme: Scheme,
     options: Options,
     course: Course,
+    limits: Limits,
     *,
     traced: bool = False,
 ) -> Iterator[MeshOutcome]:
@@ -78,7 +80,7 @@ def refined_meshes(
         count = sum(plan.faces for plan in window)
         with course.part(done / total, (done + count) / total):
             yield from _window(
-                upload, window, scheme, options, course, shares, chosen, traced=traced
+                upload, window, scheme, options, course, shares, chosen, limits, traced=traced
             )
         done += count
 
@@ -129,6 +131,7 @@ def _window(
     course: Course,
     shares: StageShares,
     chosen: dict[tuple[int, int], bool] | None,
+    limits: Limits,
     *,
     traced: bool,
 ) -> Iterator[MeshOutcome]:
@@ -136,7 +139,7 @@ def _window(
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
     # Rows of a union are numbered anew, and its faces are refined alike.
-    alike = chosen is None and not traced and not scheme.base.polygons
+    alike = chosen is None and not traced and not scheme.base.polygons and not options.goals
     if len(window) > 1 and options.weld == "position" and alike:
         outcomes = _together(window, read, scheme, options, course, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
@@ -158,6 +161,7 @@ def _window(
                 traced=traced,
                 chosen=own,
                 found=found,
+                limits=limits,
             )
     with course.part(shares.write, 1.0):
         for place in range(len(window)):
@@ -208,12 +212,14 @@ def refine_alone(
     chosen: Chosen | None = None,
     found: Sequence[Found] | None = None,
     stated: Callable[[ControlMesh, Creases], Creases] | None = None,
+    limits: Limits | None = None,
 ) -> MeshOutcome:
     """Refine one mesh, given by its primitives.
 
     `traced` asks for the parents of vertices; `chosen` faces of each primitive are refined alone;
     `found` are polygons of its triangles, for a scheme of polygons; `stated` adds creases to
-    those that the options ask for.
+    those that the options ask for; `limits` bound faces of several levels, of which the number is
+    known when they are made.
     """
     options = with_normal_rule(options, primitives)
     with course.stage("weld", shares.weld, shares.refine):
@@ -227,12 +233,15 @@ def refine_alone(
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)
     pointer, made = f"/meshes/{plan.mesh}", None
-    with course.stage("refine", shares.refine, shares.attributes):
-        if not control.is_empty:
-            made = refined_mesh(control, creases, scheme, options, pointer, course, traced=traced)
     refined: list[RefinedPrimitive] = []
+    with course.stage("refine", shares.refine, shares.attributes):
+        if not control.is_empty and options.goals:
+            asked = control, creases, scheme, options, limits or Limits(), pointer, course
+            made, refined = refine_to_goal(*asked, traced=traced)
+        elif not control.is_empty:
+            made = refined_mesh(control, creases, scheme, options, pointer, course, traced=traced)
     with course.stage("attributes", shares.attributes, shares.write):
-        if made is not None:
+        if made is not None and not options.goals:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
             cut = None if chosen is None else cut_faces(control, chosen)
             if control.polygons is not None:

@@ -1,0 +1,449 @@
+"""Refine a mesh until it is near enough to its limit surface, or has so many faces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Integer
+
+from pns_common.adaptive.certificate import distances
+from pns_common.adaptive.parts import CHILDREN, Levels, Part, Refined, Settled
+from pns_common.adaptive.tree import (
+    DIGITS,
+    Codes,
+    Flags,
+    Goal,
+    Start,
+    Tree,
+    sides_split,
+)
+from pns_common.errors import MeshError, ParameterError
+from pns_common.mesh.creases import Creases
+from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.rows import marked
+from pns_common.operator.level import Level
+from pns_common.operator.scheme import Scheme
+from pns_common.parameters import is_number, is_whole
+from pns_common.refinement import Refinement, Step, check_coordinates, reference_length_of
+from pns_common.report import Report, limit_distances
+from pns_common.schemes.limit import limit_normals, limit_positions
+from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
+
+# Errors to which trees are grown fall by this at most from one to the next, and are always below
+# the largest that is left.
+SMALLER, BELOW = 1 / 4, 1 - 1e-9
+# The corners of a face's children, as halves of sums of two of its own.
+CHILD_CORNERS = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 5]])
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """The way from values of control vertices to those of written ones.
+
+    Attributes:
+        steps: from each level to the next.
+        settled: what ends on the limit at each level.
+        rows: (W,) the written vertices' names.
+        levels: the rules.
+    """
+
+    steps: list[Refined]
+    settled: list[list[Settled]]
+    rows: Integer[np.ndarray, " W"]
+    levels: Levels
+
+    @property
+    def count(self) -> int:
+        """Number of written vertices."""
+        return len(self.rows)
+
+    def __call__(self, values: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+        """Return values at the written vertices, by the base scheme's masks and limit masks."""
+        made = np.zeros((int(self.rows.max(initial=-1)) + 1, values.shape[1]))
+        base, blocks = self.levels.base, self.levels.blocks.quiet()
+        for depth, settled in enumerate(self.settled):
+            for own in settled:
+                there = values
+                for step in own.steps:
+                    there = base.place(there[step.vertices], step.topology, blocks)[step.kept]
+                ends = limit_positions(there, own.topology, blocks, base)[own.rows]
+                known = own.names < len(made)
+                made[own.names[known]] = ends[known]
+            if depth < len(self.steps):
+                step = self.steps[depth]
+                values = base.place(values[step.vertices], step.topology, blocks)[step.kept]
+        return made[self.rows]
+
+    def matrix(self, count: int) -> SubdivisionMatrix:
+        """Return the matrix S with ``S @ values = carry(values)`` of ``count`` control vertices."""
+        base, blocks = self.levels.base, self.levels.blocks.quiet()
+
+        def follow(given: SubdivisionMatrix, step: Refined) -> SubdivisionMatrix:
+            masks = mask_matrix(step.topology, base.place, blocks).take(step.kept)
+            return product(masks, given.take(step.vertices))
+
+        def to_limit(values: np.ndarray, mesh: Any, some: Any) -> np.ndarray:
+            return limit_positions(values, mesh, some, base)
+
+        every = np.arange(count)
+        trunk = SubdivisionMatrix(every, every, np.ones(count), (count, count))
+        parts, names = list[SubdivisionMatrix](), list[np.ndarray]()
+        for depth, settled in enumerate(self.settled):
+            for own in settled:
+                there = trunk
+                for step in own.steps:
+                    there = follow(there, step)
+                masks = mask_matrix(own.topology, to_limit, blocks).take(own.rows)
+                parts.append(product(masks, there))
+                names.append(own.names)
+            if depth < len(self.steps):
+                trunk = follow(trunk, self.steps[depth])
+        firsts = np.cumsum([0, *(part.shape[0] for part in parts)])
+        rows = np.concatenate(
+            [first + part.rows for first, part in zip(firsts[:-1], parts, strict=True)]
+        )
+        whole = SubdivisionMatrix(
+            rows,
+            np.concatenate([part.columns for part in parts]),
+            np.concatenate([part.weights for part in parts]),
+            (int(firsts[-1]), count),
+        )
+        of_names = np.concatenate(names)
+        order = np.argsort(of_names, kind="stable")
+        return whole.take(order[np.searchsorted(of_names, self.rows, sorter=order)])
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class AdaptiveRefinement(Refinement):
+    """A refinement with faces of several levels.
+
+    Attributes:
+        face_parents: (F,) the control face that each face is a part of.
+        weights: (F, 3, 3) weights of that face's corners at each corner of a face: whole multiples
+            of 2^-levels that sum to 1.
+        face_levels: (F,) how often each face's parent was split.
+        distances: (F,) no point of the part of the limit surface that a face stands for is farther
+            from its plane, in the mesh's units; at sharp edges none from the edge.
+        goal: what was asked for.
+        trail: how values of control vertices become those of refined ones.
+        control: the control mesh with its sharp edges.
+    """
+
+    face_parents: Integer[np.ndarray, " F"] = field(repr=False)
+    weights: Float[np.ndarray, "F 3 3"] = field(repr=False)
+    face_levels: Integer[np.ndarray, " F"] = field(repr=False)
+    distances: Float[np.ndarray, " F"] = field(repr=False)
+    goal: Goal
+    trail: Trail = field(repr=False)
+    control: Level = field(repr=False)
+
+    @cached_property
+    def reference_length(self) -> float:
+        """R, the unit of length of the budget."""
+        return reference_length_of(self.control)
+
+    @property
+    def topologies(self) -> Any:
+        """Raise: there is no whole mesh of each level."""
+        raise MeshError("faces of several levels: use carry, weights or parents", element="faces")
+
+    @cached_property
+    def parents(self) -> SubdivisionMatrix:
+        """The control vertices that each refined vertex is made of, with their weights."""
+        return self.trail.matrix(len(self.control.points))
+
+    def __repr__(self) -> str:
+        vertices, faces = len(self.mesh.vertices), self.mesh.face_count
+        return f"Refinement({self.scheme.name!r}, {self.goal}, {vertices=}, {faces=})"
+
+    def carry(self, values: Float[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
+        """Return values of vertices at the refined ones, as ``parents @ values``."""
+        return self.trail(np.asarray(values, dtype=np.float64))
+
+    def at_corners(self, values: Float[np.ndarray, "H K"]) -> Float[np.ndarray, "F 3 K"]:
+        """Return values of the control mesh's corners at corners of faces, linear in each face."""
+        own = np.asarray(values, dtype=np.float64).reshape(-1, 3, values.shape[1])
+        return self.weights @ own[self.face_parents]
+
+    @cached_property
+    def report(self) -> Report:
+        """Counts and diagnostics; see ``Report``."""
+        learned = [step.report() for step in self.steps if step.added is not None]
+        levels = np.bincount(self.face_levels)
+        return {
+            "scheme": self.scheme.name,
+            "budget": self.scheme.budget,
+            "model": self.scheme.model,
+            "model_hash": self.scheme.model_hash,
+            "reference_length": self.reference_length,
+            "multi_fan_vertices": int(self.control.multi_fan_vertices.sum()),
+            **limit_distances(learned, self.limit_shift),
+            "levels": learned,
+            "adaptive": {
+                "tolerance": self.goal.tolerance,
+                "max_edge_length": self.goal.max_edge_length,
+                "max_faces": self.goal.max_faces,
+                "vertices": len(self.mesh.vertices),
+                "faces": self.mesh.face_count,
+                "faces_by_level": levels.tolist(),
+                "distance_max": float(self.distances.max(initial=0.0)),
+            },
+        }
+
+
+def refine_to_goal(
+    level: Level,
+    first: Step | None,
+    scheme: Scheme,
+    creases: Creases,
+    goal: Goal,
+    deepest: int,
+    tell: Callable[[int], None],
+) -> AdaptiveRefinement:
+    """Refine a mesh to a goal.
+
+    Args:
+        level: the control mesh with its sharp edges.
+        first: the first step, where the scheme's rule acts at it.
+        scheme, creases: those of the refinement.
+        goal: what is to be reached.
+        deepest: the most levels that may be used.
+        tell: called with numbers of faces, at each level of each attempt.
+    """
+    mesh = level.topology
+    levels = Levels(scheme.base, level.blocks.quiet(), deepest, creases.levels)
+    numbers, faces = np.arange(len(level.points)), np.arange(mesh.face_count)
+    control = Part(0, mesh, level.points, numbers, faces, np.ones(len(faces), dtype=bool))
+    start = Start(control, None, levels, goal, tell)
+    if first is not None:
+        every = np.arange(len(first.points))
+        topology = scheme.base.split(mesh, levels.blocks, inherit=levels.inherit(1))
+        codes, there = np.arange(CHILDREN * len(faces)), np.ones(CHILDREN * len(faces), dtype=bool)
+        finer = Part(1, topology, first.points, every, codes, there)
+        start = replace(start, first=(finer, Refined(numbers, mesh, every)))
+    tree = _with_so_many(start) if goal.max_faces is not None else _near_enough(start)
+    return _written(tree, level, first, scheme, levels, goal)
+
+
+def _near_enough(start: Start) -> Tree:
+    """Return a tree that reaches the tolerance, and whose faces can be cut to meet."""
+    forced: Codes | None = None
+    while True:
+        tree = start.grow(1.0, forced)
+        closed = tree.closed(tree.split, start.goal.tolerance)
+        if _same(tree.split, closed):
+            return tree
+        forced = tree.codes(closed)
+
+
+def _with_so_many(start: Start) -> Tree:
+    """Return a tree of so many faces as are asked for, or fewer."""
+    goal, tree = start.goal, start.grow(np.inf)
+    most, bounded = goal.max_faces or 0, goal.tolerance is not None or goal.max_edge_length
+    threshold, least = math.inf, 1.0 if bounded else 0.0
+    while True:
+        made = tree.count(tree.closed(tree.split))
+        left = _largest_left(tree, start.levels.deepest)
+        if made > most or left <= least:
+            break
+        threshold = max(min(threshold * max(SMALLER, made / most), left * BELOW), least)
+        tree = start.grow(threshold)
+    order = _worst_first(tree)
+    low, high = 0, len(order) + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        fits = tree.count(tree.closed(_flagged(tree, order[:middle]))) <= most
+        low, high = (middle, high) if fits else (low, middle)
+    split = tree.closed(_flagged(tree, order[:low]))
+    return start.grow(threshold, tree.codes(split), only=True)
+
+
+def _largest_left(tree: Tree, deepest: int) -> float:
+    """Return the largest error of faces that are not split and could be."""
+    errors = (
+        layer.errors[layer.part.exists & ~layer.split].max(initial=0.0)
+        for layer in tree.layers[:deepest]
+    )
+    return float(max(errors))
+
+
+def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
+    """Return depth and row of split faces, those of the largest errors first, by place if equal."""
+    errors, above = [layer.errors.copy() for layer in tree.layers], list[np.ndarray]()
+    for finer, coarser, of_finer, of_coarser in zip(
+        tree.layers[:0:-1], tree.layers[-2::-1], errors[:0:-1], errors[-2::-1], strict=True
+    ):
+        # A face is not better than its children, so that none comes before its parent.
+        rows = np.flatnonzero(finer.part.exists)
+        parents = np.searchsorted(coarser.part.codes, finer.part.codes[rows] // CHILDREN)
+        np.maximum.at(of_coarser, parents, of_finer[rows])
+    at, values, middles = above, list[np.ndarray](), list[np.ndarray]()
+    for depth, layer in enumerate(tree.layers):
+        rows, part = np.flatnonzero(layer.split), layer.part
+        at.append(np.stack([np.full(len(rows), depth), rows], axis=1))
+        values.append(errors[depth][rows])
+        middles.append(tree.places[part.names[part.topology.faces[rows]]].mean(axis=1))
+    places, error = np.concatenate(middles), np.concatenate(values)
+    size = np.abs(places).max(initial=0.0) or 1.0
+    keys = np.round(places / size, DIGITS)
+    order = np.lexsort([*keys.T[::-1], np.concatenate(at)[:, 0], -_shortened(error)])
+    return np.concatenate(at)[order]
+
+
+def _shortened(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """Return values of DIGITS digits."""
+    with np.errstate(divide="ignore"):
+        scale = 10.0 ** (DIGITS - np.ceil(np.log10(values)))
+    return np.where(values > 0, np.round(values * scale) / scale, 0.0)
+
+
+def _flagged(tree: Tree, rows: Integer[np.ndarray, "N 2"]) -> Flags:
+    return [
+        marked(rows[rows[:, 0] == depth, 1], len(layer.split))
+        for depth, layer in enumerate(tree.layers)
+    ]
+
+
+def _same(one: Flags, other: Flags) -> bool:
+    return all(bool((a == b).all()) for a, b in zip(one, other, strict=True))
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+def _written(
+    tree: Tree, level: Level, first: Step | None, scheme: Scheme, levels: Levels, goal: Goal
+) -> AdaptiveRefinement:
+    """Return the refinement of a tree whose faces can be cut to meet."""
+    made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
+    keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
+    order = np.argsort(np.concatenate(keys), kind="stable")
+    names, weights, distance, codes = (
+        np.concatenate([getattr(own, name) for own in made])[order]
+        for name in ("names", "weights", "distances", "codes")
+    )
+    depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
+    used = marked(names, len(tree.places))
+    used[: len(level.points)] = True
+    rows, number = np.flatnonzero(used), np.cumsum(used) - 1
+    settled = [list(layer.settled) for layer in tree.layers]
+    if first is not None:
+        # The control mesh's vertices and the first new ones end there together, a level later.
+        after = settled[1] if len(settled) > 1 else []
+        settled = [[], settled[0] + after, *settled[2:]]
+    normals = np.zeros_like(tree.places)
+    for own in chain.from_iterable(settled):
+        turned = limit_normals(own.points, own.topology, levels.blocks, levels.base)
+        normals[own.names] = turned.vertices[own.rows]
+    steps = [layer.step for layer in tree.layers if layer.step is not None]
+    points, shift = tree.places[rows], 0.0
+    check_coordinates(points, levels.blocks)
+    nothing = np.broadcast_to(0.0, len(rows))
+    return AdaptiveRefinement(
+        mesh=Mesh.of_refined(points, number[names]),
+        ratio=nothing,
+        gate=nothing,
+        normals=normals[rows],
+        steps=[] if first is None else [first],
+        scheme=scheme,
+        limit_shift=shift,
+        face_parents=codes >> (2 * depths),
+        weights=weights,
+        face_levels=depths,
+        distances=distance,
+        goal=goal,
+        trail=Trail(steps, settled, rows, levels),
+        control=level,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Faces of one level: names of corners, weights, distances, codes."""
+
+    names: Integer[np.ndarray, "F 3"]
+    weights: Float[np.ndarray, "F 3 3"]
+    distances: Float[np.ndarray, " F"]
+    codes: Integer[np.ndarray, " F"]
+
+
+def _faces_of(tree: Tree, depth: int) -> _Faces:
+    """Return the faces of a level that are not split; those beside split ones are cut in two."""
+    layer = tree.layers[depth]
+    mesh, part = layer.part.topology, layer.part
+    rows = np.flatnonzero(part.exists & ~layer.split)
+    cut = sides_split(layer, layer.split)[rows] > 0
+    codes, distance = part.codes[rows], distances(layer.slabs[rows])
+    distance[cut] = tree.cut_distances(depth, rows[cut], layer.split)
+    names, weights = part.names[mesh.faces[rows]], _weights(codes, depth)
+    divided = marked(mesh.face_edges[layer.split], len(mesh.edges))[mesh.face_edges[rows[cut]]]
+    # From a corner a, before the side that is cut at m: (a, m, c) and (m, b, c).
+    turn = (divided.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    own = np.arange(len(turn))
+    middle = layer.middles[mesh.face_edges[rows[cut]][own, turn[:, 0]]]
+    a, b, c = names[cut][own[:, None], turn].T
+    wa, wb, wc = (weights[cut][own, turn[:, k]] for k in range(3))
+    between = (wa + wb) / 2
+    counts = np.where(cut, 2, 1)
+    at = np.repeat(np.arange(len(rows)), counts)
+    firsts = (np.cumsum(counts) - counts)[cut]
+    names, weights = names[at], weights[at]
+    names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
+    weights[firsts] = np.stack([wa, between, wc], axis=1)
+    weights[firsts + 1] = np.stack([between, wb, wc], axis=1)
+    return _Faces(names, weights, distance[at], codes[at])
+
+
+def _weights(codes: Integer[np.ndarray, " F"], depth: int) -> Float[np.ndarray, "F 3 3"]:
+    """Return the weights of control faces' corners at the corners of faces of a level."""
+    made = np.tile(np.eye(3), (len(codes), 1, 1))
+    for level in reversed(range(depth)):
+        child = (codes >> (2 * level)) % CHILDREN
+        middles = (made + np.roll(made, -1, axis=1)) / 2
+        points = np.concatenate([made, middles], axis=1)
+        made = np.take_along_axis(points, CHILD_CORNERS[child][:, :, None], axis=1)
+    return made
+
+
+# --- arguments ------------------------------------------------------------------------------------
+
+
+def goal_of(mesh: Mesh, tolerance: Any, max_faces: Any, max_edge_length: Any) -> Goal:
+    """Return what a refinement is to reach.
+
+    Raises:
+        ParameterError: a length that is not above 0, or fewer faces than the mesh has.
+    """
+    if max_faces is not None and not (is_whole(max_faces) and max_faces >= mesh.face_count):
+        expected = f"a whole number, at least {mesh.face_count}: faces are split, never joined"
+        raise ParameterError("max_faces", max_faces, expected=expected)
+    return Goal(
+        _length(mesh, "tolerance", tolerance),
+        _length(mesh, "max_edge_length", max_edge_length),
+        None if max_faces is None else int(max_faces),
+    )
+
+
+def _length(mesh: Mesh, name: str, given: Any) -> float | None:
+    """Return a length in the mesh's units, of a number or a share of its diagonal."""
+    if given is None:
+        return None
+    value, unit = given, 1.0
+    if isinstance(given, str):
+        text = given.strip()
+        with suppress(ValueError):
+            value = float(text.removesuffix("%"))
+        if text.endswith("%"):
+            used = mesh.vertices[np.unique(mesh.corners)]
+            unit = float(np.linalg.norm(np.ptp(used, axis=0))) / 100 if len(used) else 1.0
+    if not (is_number(value) and float(value) > 0):
+        expected = "a length above 0, or a share of the diagonal, as 0.1%"
+        raise ParameterError(name, given, expected=expected)
+    return float(value) * unit

@@ -1,0 +1,301 @@
+"""A tree of faces: those that are split, and cuts where neighbours of two levels meet.
+
+A face is split where its error is too large. Then, so that no vertex lies inside of another face's
+side, neighbours differ by one level at most: a face beside one that is split is cut in two, from
+the new vertex to the corner opposite; with two such sides it is split too. So there is nothing to
+choose, and the result does not depend on numbering.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Integer
+
+from pns_common.adaptive.certificate import cut_distances, distances, folded, slabs
+from pns_common.adaptive.parts import (
+    CHILDREN,
+    NOT_THERE,
+    Levels,
+    Part,
+    Refined,
+    Settled,
+)
+from pns_common.kernels.flatness import COLUMNS
+from pns_common.mesh.rows import marked
+
+# Faces are measured once more unless their error is below SPARE thresholds, so that they can be cut
+# in two at any side, or above NEAR thresholds, so that they are to be split in all likelihood.
+SPARE, NEAR = 1 / 2, 4.0
+# Errors that agree in so many digits are equal.
+DIGITS = 9
+Flags = Sequence[Bool[np.ndarray, " _"]]
+Codes = Sequence[Integer[np.ndarray, " _"]]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The goal of a refinement; lengths in the mesh's units.
+
+    Attributes:
+        tolerance: no face is to be farther from the limit surface.
+        max_edge_length: no edge is to be longer.
+        max_faces: so many faces at most, those of the largest errors split first.
+    """
+
+    tolerance: float | None = None
+    max_edge_length: float | None = None
+    max_faces: int | None = None
+
+    def errors(
+        self, distance: Float[np.ndarray, " N"], triangles: Float[np.ndarray, "N 3 3"]
+    ) -> Float[np.ndarray, " N"]:
+        """Return the errors of faces: above 1 where they are to be split.
+
+        With nothing but ``max_faces`` they are distances.
+        """
+        parts = list[np.ndarray]()
+        if self.tolerance is not None:
+            parts.append(distance / self.tolerance)
+        if self.max_edge_length is not None:
+            sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+            parts.append(sides.max(axis=1) / self.max_edge_length)
+        return np.maximum.reduce(parts) if parts else distance
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A level of a tree of faces.
+
+    Attributes:
+        part: the faces, and those around them.
+        split: (F,) which faces are split.
+        errors, slabs: (F,), (F, 14) of those that exist; 0 elsewhere.
+        middles: (E,) the name of the vertex on each edge at the next level, or NOT_THERE.
+        step: from this level to the next; None at the last.
+        settled: vertices that are in no level before.
+    """
+
+    part: Part
+    split: Bool[np.ndarray, " F"]
+    errors: Float[np.ndarray, " F"]
+    slabs: Float[np.ndarray, "F 14"]
+    middles: Integer[np.ndarray, " E"]
+    step: Refined | None
+    settled: Sequence[Settled]
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Faces of all levels.
+
+    Attributes:
+        layers: from the control mesh on.
+        places: (N, 3) where named vertices are on the limit surface; NaN where none exists.
+    """
+
+    layers: Sequence[Layer]
+    places: Float[np.ndarray, "N 3"]
+
+    @property
+    def split(self) -> Flags:
+        """The faces that are split, level by level."""
+        return [layer.split for layer in self.layers]
+
+    def codes(self, split: Flags) -> Codes:
+        """Return the codes of flagged faces."""
+        return [at.part.codes[own] for at, own in zip(self.layers, split, strict=True)]
+
+    def closed(self, split: Flags, widest: float | None = None) -> Flags:
+        """Return the faces to split, so that the others can be cut to meet them.
+
+        Args:
+            split: faces that are split in any case, level by level; with a face its ancestors.
+            widest: faces are cut in two only if both parts are no farther from the limit surface;
+                None: any.
+        """
+        made = [own.copy() for own in split]
+        for depth in reversed(range(len(made))):
+            layer, own = self.layers[depth], made[depth]
+            while True:
+                sides = sides_split(layer, own)
+                more = ~own & (sides > 1)
+                if widest is not None:
+                    cut = np.flatnonzero(~own & (sides == 1) & layer.part.exists)
+                    more[cut] = self.cut_distances(depth, cut, own) > widest
+                if not more.any():
+                    break
+                own |= more
+            if depth:
+                # Such a face exists, or is split or cut, only where its parent is split.
+                asked = layer.part.codes[own | (sides > 0)] // CHILDREN
+                above = self.layers[depth - 1].part.codes
+                made[depth - 1][np.searchsorted(above, asked)] = True
+        return made
+
+    def cut_distances(
+        self, depth: int, rows: Integer[np.ndarray, " N"], split: Bool[np.ndarray, " F"]
+    ) -> Float[np.ndarray, " N"]:
+        """Return how far the limit surface can be from faces of one cut side, cut in two."""
+        layer = self.layers[depth]
+        mesh, names = layer.part.topology, layer.part.names
+        sides = marked(mesh.face_edges[split], len(mesh.edges))[mesh.face_edges[rows]]
+        edge = mesh.face_edges[rows, sides.argmax(axis=1)]
+        middle = layer.middles[edge]
+        there = np.where((middle == NOT_THERE)[:, None], np.nan, self.places[middle])
+        return cut_distances(layer.slabs[rows], self.places[names[mesh.faces[rows]]], there)
+
+    def count(self, split: Flags) -> int:
+        """Return how many faces are written, of flags that are ``closed``."""
+        cut = sum(
+            int((~own & (sides_split(layer, own) > 0)).sum())
+            for layer, own in zip(self.layers, split, strict=True)
+        )
+        divided = sum(int(own.sum()) for own in split)
+        return self.layers[0].part.topology.face_count + (CHILDREN - 1) * divided + cut
+
+
+def sides_split(layer: Layer, split: Bool[np.ndarray, " F"]) -> Integer[np.ndarray, " F"]:
+    """Return how many sides of each face are those of split faces."""
+    mesh = layer.part.topology
+    return marked(mesh.face_edges[split], len(mesh.edges))[mesh.face_edges].sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """The start of trees: a control mesh, rules and a goal.
+
+    Attributes:
+        control: the control mesh, whose faces all exist.
+        first: the whole next level and the step to it, where it is made by more than masks.
+        levels: the rules.
+        goal: what is to be reached.
+        tell: called at each level with the number of its faces.
+    """
+
+    control: Part
+    first: tuple[Part, Refined] | None
+    levels: Levels
+    goal: Goal
+    tell: Callable[[int], None]
+
+    def grow(self, threshold: float, forced: Codes | None = None, *, only: bool = False) -> Tree:
+        """Split the faces whose error is above a threshold, and those that are forced.
+
+        A face is measured by its own control points, by those of its children if that leaves it
+        uncertain whether it may stay or be cut, and by those of theirs if these come near.
+
+        Args:
+            threshold: of errors.
+            forced: codes of faces that are split in any case, level by level.
+            only: split no others.
+        """
+        part, names = self.control, len(self.control.points)
+        places, layers = np.full((names, 3), np.nan), list[_Growing]()
+        pending = np.zeros(part.topology.face_count, dtype=bool)
+        for depth in range(self.levels.deepest + 1):
+            layer = _Growing(part)
+            layers.append(layer)
+            self.tell(int(part.exists.sum()))
+            learned = self.first is not None and depth == 0
+            if not learned:
+                layer.settled = self._settle(part, places)
+                self._measure(layer, part.exists, places)
+            must = np.zeros(part.topology.face_count, dtype=bool)
+            if forced is not None and depth < len(forced):
+                must = part.exists & np.isin(part.codes, forced[depth])
+            asked = must | (layer.errors > SPARE * threshold) | (learned & part.exists)
+            if depth:
+                asked |= np.isin(part.codes // CHILDREN, layers[-2].part.codes[pending])
+            if depth == self.levels.deepest or not asked.any():
+                break
+            if learned and self.first is not None:
+                finer, layer.step = self.first
+                layer.middles = names + np.arange(len(part.topology.edges))
+                places = _longer(places, len(layer.middles))
+                layer.settled = self._settle(finer, places)
+            else:
+                finer, layer.step, layer.middles = self.levels.split(part, asked, names)
+                places = _longer(places, len(layer.step.topology.edges))
+            names = len(places)
+            if depth and pending.any():
+                self._measure(layers[-2], pending, places, finer, 2)
+                above = layers[-2]
+                above.split &= ~pending | above.must | (above.errors > threshold)
+                part = layer.part = replace(part, exists=_children(part, above))
+            self._measure(layer, asked & part.exists, places, finer, 1)
+            layer.must = must & part.exists
+            layer.split = layer.must | (part.exists & (layer.errors > threshold) & (not only))
+            near = (layer.errors > SPARE * threshold) & (layer.errors <= NEAR * threshold)
+            pending = part.exists & ~must & near
+            part = replace(finer, exists=_children(finer, layer))
+            if not (layer.split.any() or pending.any()):
+                break
+        return Tree([layer.done() for layer in layers], places)
+
+    def _settle(self, part: Part, places: Float[np.ndarray, "N 3"]) -> list[Settled]:
+        """Put vertices of faces that exist, and are not yet there, on the limit."""
+        used = marked(part.topology.faces[part.exists], len(part.points))
+        if part.depth == 0 or (self.first is not None and part.depth == 1):
+            used[:] = True  # vertices of no face are written too
+        made = self.levels.settle(part, np.flatnonzero(used & np.isnan(places[part.names, 0])))
+        for own in made:
+            places[own.names] = own.limits
+        return made
+
+    def _measure(
+        self,
+        layer: _Growing,
+        faces: Bool[np.ndarray, " F"],
+        places: Float[np.ndarray, "N 3"],
+        finer: Part | None = None,
+        deeper: int = 0,
+    ) -> None:
+        """Measure faces by those of a part that is so many levels deeper, and keep what is less."""
+        rows = np.flatnonzero(faces)
+        if len(rows) == 0:
+            return
+        part, each = layer.part, int(CHILDREN**deeper)
+        triangles = places[part.names[part.topology.faces[rows]]]
+        of_finer = rows
+        if finer is not None:
+            codes = each * part.codes[rows, None] + np.arange(each)
+            of_finer = np.searchsorted(finer.codes, codes)
+        sides = layer.folded[rows]
+        made = slabs(finer or part, of_finer, triangles, sides, self.levels, deeper)
+        known, old = layer.measured[rows], layer.slabs[rows]
+        made[known, ::2] = np.maximum(made[known, ::2], old[known, ::2])
+        made[known, 1::2] = np.minimum(made[known, 1::2], old[known, 1::2])
+        layer.slabs[rows], layer.measured[rows] = made, True
+        layer.errors[rows] = self.goal.errors(distances(made), triangles)
+
+
+class _Growing:
+    """A layer that is being made; attributes as of ``Layer``."""
+
+    def __init__(self, part: Part) -> None:
+        """Begin with nothing measured and nothing split."""
+        count, none = part.topology.face_count, np.zeros(part.topology.face_count, dtype=bool)
+        self.part, self.folded = part, folded(part)
+        self.split, self.must, self.measured = none.copy(), none.copy(), none.copy()
+        self.errors, self.slabs = np.zeros(count), np.zeros((count, COLUMNS))
+        self.middles = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
+        self.step: Refined | None = None
+        self.settled: list[Settled] = []
+
+    def done(self) -> Layer:
+        """Return what was made."""
+        made = self.errors, self.slabs, self.middles, self.step, self.settled
+        return Layer(self.part, self.split, *made)
+
+
+def _children(finer: Part, layer: _Growing) -> Bool[np.ndarray, " F"]:
+    """Return the faces of a part that are children of split faces."""
+    return finer.exists & np.isin(finer.codes // CHILDREN, layer.part.codes[layer.split])
+
+
+def _longer(places: Float[np.ndarray, "N 3"], more: int) -> Float[np.ndarray, "M 3"]:
+    """Return places of so many vertices more, of NaN."""
+    return np.concatenate([places, np.full((more, 3), np.nan)])

@@ -1,0 +1,257 @@
+"""Adaptive refinement: near enough to the limit surface, no gaps, no matter of numbering."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from pns_common import Mesh, MeshError, ParameterError, load_model, loop, pns, refine
+from pns_common.mesh.topology import EdgeClass
+from tests.support.meshes import (
+    bent,
+    block,
+    bow_tie,
+    bumpy_sphere,
+    grid,
+    prism,
+    rotation,
+    three_pages,
+)
+
+SCHEMES = {"loop": loop(), "pns": pns(load_model())}
+LEVELS = 3
+# What networks in single precision leave between a mesh and its mirror image.
+NETWORKS = 1e-5
+
+
+def drum(sides=16):
+    """Return a prism over a regular polygon, its lids cut from a corner."""
+    turns = 2 * np.pi * np.arange(sides) / sides
+    return prism(np.stack([np.cos(turns), np.sin(turns)], axis=1))
+
+
+SHAPES = {
+    "bumps": lambda: bumpy_sphere(subdivisions=0, bump=0.3),
+    "sheet": lambda: grid(4, bent),
+    "block": lambda: block(1, noise=0.1),
+    "drum": lambda: drum(6),
+    "three pages": three_pages,
+    "bow-tie": bow_tie,
+}
+
+
+def shape(name):
+    made = SHAPES[name]()
+    return made if isinstance(made, Mesh) else Mesh(*made[:2])
+
+
+def diagonal(mesh):
+    return float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+
+
+def parts(made, dense, levels):
+    """Yield each face, and the vertices of the dense mesh that lie on the part it stands for."""
+    weights = np.eye(3)[None]
+    for _ in range(levels):
+        a, b, c = weights[:, 0], weights[:, 1], weights[:, 2]
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        children = (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)
+        weights = np.stack([np.stack(child, 1) for child in children], 1).reshape(-1, 3, 3)
+    corners = dense.mesh.faces.reshape(-1, weights.shape[0] * 3)
+    for row, (parent, own) in enumerate(zip(made.face_parents, made.weights, strict=True)):
+        inside = (weights.reshape(-1, 3) @ np.linalg.inv(own) > -1e-9).all(axis=1)
+        yield row, corners[parent][inside]
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_vertices_are_where_whole_levels_put_them(name, scheme):
+    mesh = shape(name)
+    made = refine(mesh, scheme, LEVELS, tolerance="0.5%")
+    whole = refine(mesh, scheme, LEVELS)
+    for row, own in parts(made, whole, LEVELS):
+        for corner in made.mesh.faces[row]:
+            away = np.linalg.norm(whole.mesh.vertices[own] - made.mesh.vertices[corner], axis=1)
+            assert away.min() < 1e-12 * diagonal(mesh)
+            at = own[away.argmin()]
+            np.testing.assert_allclose(made.normals[corner], whole.normals[at], atol=1e-9)
+    assert made.mesh.face_count <= whole.mesh.face_count
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("tolerance", ["2%", "0.3%"])
+def test_no_point_of_the_limit_surface_is_farther_than_said(name, scheme, tolerance):
+    mesh = shape(name)
+    made = refine(mesh, scheme, LEVELS, tolerance=tolerance)
+    dense = refine(mesh, scheme, LEVELS + 1)
+    reached = made.face_levels < LEVELS
+    assert (made.distances[reached] <= made.goal.tolerance).all()
+    for row, own in parts(made, dense, LEVELS + 1):
+        a, b, c = made.mesh.vertices[made.mesh.faces[row]]
+        normal = np.cross(b - a, c - a)
+        height = np.abs((dense.mesh.vertices[own] - a) @ normal) / max(
+            np.linalg.norm(normal), 1e-300
+        )
+        assert height.max() <= made.distances[row] + 1e-12 * diagonal(mesh)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("goal", [{"tolerance": "0.5%"}, {"max_faces": 200}])
+def test_faces_of_different_levels_meet_without_gaps(name, scheme, goal):
+    mesh = shape(name)
+    made = refine(mesh, scheme, LEVELS, **goal)
+    edges, control = made.mesh.topology(), mesh.topology()
+    open_edges = edges.edges[edges.edge_class != EdgeClass.INTERIOR]
+    # Each is a piece of an edge that was open: both its ends lie on one side of a control face.
+    of_edge = {tuple(e): k for k, e in enumerate(map(sorted, control.edges.tolist()))}
+    pieces = {tuple(sorted(e)) for e in open_edges.tolist()}
+    length = dict.fromkeys(np.flatnonzero(control.edge_class != EdgeClass.INTERIOR).tolist(), 0.0)
+    seen = set()
+    for face, parent, weights in zip(made.mesh.faces, made.face_parents, made.weights, strict=True):
+        for k in range(3):
+            side = tuple(sorted((face[k], face[k - 1])))
+            on = np.flatnonzero((weights[[k, k - 1]] == 0).all(axis=0))
+            if side in pieces:
+                assert len(on) == 1
+                ends = np.delete(mesh.faces[parent], on[0])
+                edge = of_edge[tuple(sorted(ends.tolist()))]
+                assert edge in length
+                if side not in seen:
+                    length[edge] += np.abs(weights[k] - weights[k - 1]).max()
+                seen.add(side)
+    assert seen == pieces
+    assert all(total == 1 for total in length.values())
+
+
+def same_faces(made, other):
+    """Return whether two meshes have the same faces, in whatever order, to rounding."""
+    one, two = (mesh.vertices[mesh.faces].mean(axis=1) for mesh in (made, other))
+    away, _ = cKDTree(one).query(two)
+    return len(one) == len(two) and away.max() < NETWORKS
+
+
+GOALS = [{"tolerance": 0.02}, {"max_faces": 300}, {"max_edge_length": 0.3}]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("goal", GOALS)
+def test_renumbering_and_motions_move_the_result(scheme, goal):
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    rng = np.random.default_rng(5)
+    order, turn = rng.permutation(len(points)), rotation(rng)
+    new = np.empty_like(order)
+    new[order] = np.arange(len(order))
+    other = np.roll(new[faces], 1, axis=1)[rng.permutation(len(faces))]
+    made = refine(Mesh(points, faces), scheme, LEVELS, **goal).mesh
+    there = refine(Mesh(points[order] @ turn.T, other), scheme, LEVELS, **goal).mesh
+    assert same_faces(made, Mesh(there.vertices @ turn, there.faces))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("goal", GOALS)
+def test_a_mirrored_mesh_becomes_the_mirrored_result(scheme, goal):
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    flip = np.array([-1.0, 1.0, 1.0])
+    made = refine(Mesh(points, faces), scheme, LEVELS, **goal).mesh
+    there = refine(Mesh(points * flip, faces[:, ::-1]), scheme, LEVELS, **goal).mesh
+    assert same_faces(made, Mesh(there.vertices * flip, there.faces[:, ::-1]))
+
+
+def test_a_cube_stays_as_it_is():
+    points, faces = block(1)[:2]
+    made = refine(Mesh(points, faces), "pns", tolerance="0.1%")
+    assert made.mesh.face_count == len(faces)
+    np.testing.assert_array_equal(made.mesh.faces, faces)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_what_is_flat_stays_whole_beside_what_bends(scheme):
+    """A sheet with a bump at one end is split there alone."""
+    points, faces = grid(13, lambda x, y: np.where(x > 0.5, (x - 0.5) * 2, 0.0) * np.cos(3 * y))
+    made = refine(Mesh(points, faces), scheme, LEVELS, tolerance="0.05%", border="corners")
+    x, y = points[faces][:, :, 0].max(axis=1), np.abs(points[faces][:, :, 1]).max(axis=1)
+    whole = np.flatnonzero((x < -0.2) & (y < 0.9))
+    assert np.isin(whole, made.face_parents[made.face_levels == 0]).all()
+    assert made.face_levels.max() > 1
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("most", [200, 1000])
+def test_max_faces_ends_within_two_per_cent(scheme, most):
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    made = refine(Mesh(points, faces), scheme, max_faces=most)
+    assert 0.98 * most - 4 <= made.mesh.face_count <= most
+
+
+def test_more_faces_are_never_farther():
+    mesh = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3))
+    last = np.inf
+    for most in (50, 100, 200, 400):
+        uncut = refine(mesh, "pns", max_faces=most).distances.max()
+        assert uncut <= last * (1 + 1e-9)
+        last = uncut
+
+
+def test_no_side_is_longer_than_asked():
+    mesh = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3))
+    made = refine(mesh, "loop", max_edge_length=0.2).mesh
+    corners = made.vertices[made.faces]
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= 0.2
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_values_are_carried_like_positions(scheme):
+    mesh = shape("bumps")
+    made = refine(mesh, scheme, LEVELS, tolerance="1%", creases=None)
+    parents = made.parents
+    dense = np.zeros(parents.shape)
+    dense[parents.rows, parents.columns] = parents.weights
+    np.testing.assert_allclose(dense.sum(axis=1), 1, atol=1e-12)
+    assert (parents.weights > 0).all()
+    values = np.random.default_rng(0).normal(size=(len(mesh.vertices), 5))
+    np.testing.assert_allclose(dense @ values, made.carry(values), atol=1e-12)
+    if scheme.rule is None:
+        np.testing.assert_allclose(dense @ mesh.vertices, made.mesh.vertices, atol=1e-12)
+    corners = np.random.default_rng(1).normal(size=(mesh.faces.size, 2))
+    carried = made.at_corners(corners)
+    wanted = np.einsum("fkj,fjd->fkd", made.weights, corners.reshape(-1, 3, 2)[made.face_parents])
+    np.testing.assert_allclose(carried, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("goal", "name"),
+    [
+        ({"tolerance": 0}, "tolerance"),
+        ({"tolerance": np.nan}, "tolerance"),
+        ({"tolerance": "-1%"}, "tolerance"),
+        ({"tolerance": "much"}, "tolerance"),
+        ({"max_edge_length": -1.0}, "max_edge_length"),
+        ({"max_faces": 11}, "max_faces"),
+        ({"max_faces": 100.5}, "max_faces"),
+        ({"tolerance": 1.0, "limit": False}, "limit"),
+        ({"tolerance": 1.0, "faces": [0]}, "faces"),
+        ({"tolerance": 1.0, "levels": 17}, "levels"),
+        ({"tolerance": 1.0, "progress": 1}, "progress"),
+    ],
+)
+def test_a_goal_that_cannot_be_reached_is_refused(goal, name):
+    mesh = Mesh(*block(1)[:2])
+    with pytest.raises(ParameterError, match=name):
+        refine(mesh, "pns", **goal)
+
+
+def test_too_few_faces_say_how_many_are_possible():
+    with pytest.raises(ParameterError, match="at least 12"):
+        refine(Mesh(*block(1)[:2]), "pns", max_faces=3)
+
+
+def test_schemes_that_cannot_are_named():
+    quads = Mesh(np.eye(4)[:, :3], [[0, 1, 2, 3]])
+    with pytest.raises(ParameterError, match="whole levels"):
+        refine(quads, "pns", tolerance=1.0)
+    with pytest.raises(ParameterError, match="first level alone"):
+        refine(Mesh(*block(1)[:2]), pns(load_model("paper")), tolerance=1.0)
+    made = refine(Mesh(*block(1)[:2]), "loop", tolerance=1.0)
+    with pytest.raises(MeshError, match="several levels"):
+        _ = made.topologies
