@@ -319,6 +319,9 @@ def test_the_description_names_bodies_parameters_and_errors(client: TestClient) 
         "compress",
         "format",
         "limit",
+        "tolerance",
+        "max_faces",
+        "max_edge_length",
     }
     statuses = {"200", "400", "401", "403", "408", "413", "415", "422", "429", "500", "503", "504"}
     assert set(operation["responses"]) == statuses
