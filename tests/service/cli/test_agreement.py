@@ -49,6 +49,9 @@ CHOSEN: dict[str, dict[str, Any]] = {
     "group": {"group": "b"},
     "compress": {"compress": "draco"},
     "limit": {"limit": False},
+    "tolerance": {"tolerance": "1%"},
+    "max_faces": {"max_faces": 100},
+    "max_edge_length": {"max_edge_length": "5%"},
 }
 MEDIA = {kind: media for media, kind in FORMATS.items()}
 

@@ -1,0 +1,134 @@
+"""Faces of several levels in files: no gaps, and all that is carried where whole levels put it."""
+
+import numpy as np
+import pytest
+
+from pns_common import Mesh, loop, refine, subdivide
+from service.errors import InvalidParameter, LimitError
+from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.convert import converted
+from service.options import Limits, Options
+from tests.support.gltf import files
+from tests.support.gltf.shapes import octahedron
+from tests.support.meshes import bumpy_sphere
+from tests.support.networks import random_model
+
+GOAL = {"tolerance": "2%"}
+
+
+def refined(*meshes, limits=None, **options):
+    options = Options(**{"scheme": "loop", "normals": "keep", "crease": "off", **options})
+    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), limits or Limits())
+
+
+def shaped(**others):
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    return {"POSITION": points.astype(np.float32), "indices": faces, **others}
+
+
+def library(**goal):
+    shape = shaped()
+    return refine(Mesh(shape["POSITION"].astype(float), shape["indices"]), loop(), **goal)
+
+
+@pytest.mark.parametrize("goal", [GOAL, {"max_faces": 200}, {"max_edge_length": "12%"}])
+def test_faces_are_the_librarys(goal):
+    faces, attributes = files.primitive_of(refined([shaped()], **goal).glb)
+    made = library(**goal).mesh
+    np.testing.assert_allclose(attributes["POSITION"][faces], made.vertices[made.faces], atol=1e-6)
+
+
+def test_texture_coordinates_are_linear_on_both_sides_of_a_seam():
+    shape = shaped()
+    faces, made = shape["indices"], library(**GOAL)
+    corners = np.random.default_rng(0).random((faces.size, 2)).astype(np.float32)
+    apart = {
+        "POSITION": shape["POSITION"][faces.reshape(-1)],
+        "indices": np.arange(faces.size).reshape(-1, 3),
+        "TEXCOORD_0": corners,
+    }
+    there, attributes = files.primitive_of(refined([apart], **GOAL).glb)
+    np.testing.assert_allclose(
+        attributes["POSITION"][there], made.mesh.vertices[made.mesh.faces], atol=1e-6
+    )
+    np.testing.assert_allclose(attributes["TEXCOORD_0"][there], made.at_corners(corners), atol=1e-6)
+
+
+def test_skins_follow_the_masks():
+    shape = shaped()
+    weights = np.random.default_rng(1).dirichlet(np.ones(3), len(shape["POSITION"]))
+    bound = shaped(
+        JOINTS_0=np.tile(np.array([0, 1, 2, 0], dtype=np.uint8), (len(weights), 1)),
+        WEIGHTS_0=np.column_stack([weights, np.zeros(len(weights))]).astype(np.float32),
+    )
+    faces, attributes = files.primitive_of(refined([bound], **GOAL).glb)
+    made = library(**GOAL)
+    total = np.zeros((len(attributes["POSITION"]), 3))
+    rows = np.arange(len(total))[:, None]
+    np.add.at(total, (rows, attributes["JOINTS_0"].astype(int)), attributes["WEIGHTS_0"])
+    np.testing.assert_allclose(total[faces], made.carry(weights)[made.mesh.faces], atol=1e-6)
+
+
+def test_normals_are_those_of_the_limit_surface():
+    faces, attributes = files.primitive_of(refined([shaped()], normals="smooth", **GOAL).glb)
+    made = library(**GOAL)
+    np.testing.assert_allclose(
+        attributes["NORMAL"][faces], made.normals[made.mesh.faces], atol=1e-5
+    )
+
+
+def test_mesh_files_are_refined_alike():
+    shape, made = shaped(), library(**GOAL)
+    rows = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in shape["POSITION"].astype(float).tolist())
+    rows += "".join(f"f {a} {b} {c}\n" for a, b, c in (shape["indices"] + 1).tolist())
+    options = Options(scheme="loop", normals="keep", crease="off", **GOAL)
+    written = converted(rows.encode(), "obj", "obj", options, None, Limits())
+    lines = [line.split() for line in written.content.decode().splitlines()]
+    points = np.array([line[1:4] for line in lines if line[:1] == ["v"]], dtype=float)
+    faces = np.array(
+        [[int(at.split("/")[0]) - 1 for at in line[1:]] for line in lines if line[:1] == ["f"]]
+    )
+    np.testing.assert_allclose(points[faces], made.mesh.vertices[made.mesh.faces], atol=1e-9)
+    assert written.report["meshes"][0]["adaptive"]["faces"] == len(faces)
+
+
+def test_data_of_other_libraries_follow():
+    trimesh = pytest.importorskip("trimesh")
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    mesh = trimesh.Trimesh(points, faces, process=False)
+    mesh.vertex_attributes["height"] = points[:, 2:]
+    made = subdivide(mesh, scheme=loop(), tolerance="2%")
+    assert made.is_watertight
+    assert len(made.vertices) == len(made.vertex_attributes["height"])
+    np.testing.assert_array_equal(made.vertex_attributes["height"][: len(points)], points[:, 2:])
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ({"tolerance": "0"}, "tolerance"),
+        ({"tolerance": "-1"}, "tolerance"),
+        ({"tolerance": "nan"}, "tolerance"),
+        ({"max_edge_length": "1 mm"}, "max_edge_length"),
+        ({"max_faces": 0}, "max_faces"),
+        ({"tolerance": "1", "uv": "smooth"}, "uv"),
+        ({"tolerance": "1", "limit": False}, "limit"),
+        ({"tolerance": "1", "scheme": "catmull-clark"}, "scheme"),
+        ({"max_faces": 100, "material": "a"}, "material"),
+    ],
+)
+def test_what_cannot_be_is_said(options, name):
+    with pytest.raises(InvalidParameter) as error:
+        Options(**options)
+    assert error.value.name == name
+
+
+def test_fewer_faces_than_there_are_is_an_error_that_says_how_many_are_possible():
+    with pytest.raises(InvalidParameter, match="at least 8") as error:
+        refined([octahedron()], max_faces=3)
+    assert error.value.name == "max_faces"
+
+
+def test_the_limit_of_faces_holds():
+    with pytest.raises(LimitError):
+        refined([shaped()], tolerance="0.01%", limits=Limits(max_faces=2000))
