@@ -124,8 +124,8 @@ class Report(LimitDistances):
     ``learned_levels`` counts the levels at which the learned rule acted. ``limit_distance`` is the
     sum over levels of the longest displacement, in the mesh's units: no vertex, and no point of the
     limit surface, is farther from where the base scheme would have had it. What creases keep back
-    from the smooth rules counts too. ``limit_distance_bound`` is the sum of the longest that the
-    budget allows.
+    from the smooth rules counts too, but with a goal that of the first level alone.
+    ``limit_distance_bound`` is the sum of the longest that the budget allows.
     """
 
     scheme: str

@@ -321,8 +321,13 @@ def predicted_faces(
     """Return how many faces the refined file will have, found without refining.
 
     Raises:
-        ServiceError: the file cannot be used, or would be over a limit.
+        ServiceError: the file cannot be used, or would be over a limit; or a goal is given.
     """
+    if options.goals:
+        raise InvalidParameter(
+            "dry_run",
+            f"how many faces {', '.join(options.goals)} gives is known when they are made",
+        )
     if kind in GLTF_KINDS:
         upload = read_upload(data, kind, options.levels, limits, siblings)
         return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
