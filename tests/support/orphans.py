@@ -35,7 +35,7 @@ def serve(pipe: Path) -> None:
     """Have a worker of the service do it."""
 
     async def scenario() -> None:
-        workers = Workers(1, 3600, stand_in_jobs.nothing)
+        workers = Workers(1, 3600, stand_in_jobs.nothing, print)
         workers.start()
         await workers.run(workers.join("a"), hold_open, pipe)
 

@@ -25,7 +25,7 @@ def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
     assert outcome.exit_code == 0
     for shown in ("2/2", "Distance RMSE", "Hausdorff", "Normal error", "95 % interval"):
         assert shown in outcome.output
-    checkpoint = load_checkpoint(tmp_path / "checkpoints" / "paper.safetensors")
+    checkpoint = load_checkpoint(tmp_path / "build" / "checkpoints" / "paper.safetensors")
     assert checkpoint.recipe == quick_paper()
     assert set(checkpoint.metrics) == {"ridge-held-out"}
 

@@ -7,6 +7,8 @@ side those of the faces there.
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -59,16 +61,18 @@ def refine_to_goal(
         course.reach(done / total)
 
     try:
-        made = refine(
-            control.surface,
-            scheme,
-            None,
-            options.reference_length,
-            **options.goals,
-            creases=creases,
-            progress=watch,
+        made = cast(
+            AdaptiveRefinement,
+            refine(
+                control.surface,
+                scheme,
+                None,
+                options.reference_length,
+                **options.goals,
+                creases=creases,
+                progress=watch,
+            ),
         )
-        assert isinstance(made, AdaptiveRefinement)
         if not control.primitives[0].is_double:
             check_range(made.mesh)
     except MeshError as error:
@@ -169,7 +173,8 @@ def _normals(
     split: Joined, blended: Float[np.ndarray, "N 3"], made: AdaptiveRefinement
 ) -> Float[np.ndarray, "N 3"]:
     """Return normals of rows: the surface's; where the file's part, those of the faces there."""
-    assert made.normals is not None
+    if made.normals is None:
+        raise ValueError("a goal gives normals")
     vertex = split.vertex
     keys = np.column_stack([vertex, np.rint(blended / SAME_SIDE).astype(np.int64)])
     side = distinct_rows(keys)

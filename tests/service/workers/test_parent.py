@@ -15,7 +15,9 @@ def test_a_worker_ends_with_a_parent_that_is_killed_also_inside_a_job(start, tmp
     os.mkfifo(pipe)
     parent = multiprocessing.get_context("spawn").Process(target=start, args=(pipe,))
     parent.start()
-    with pipe.open("rb", buffering=0) as told:
+    # Without waiting for a writer, whose process may have died.
+    with os.fdopen(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as told:
+        assert select.select([told], [], [], 60)[0]
         assert told.read(5) == b"begun"
         parent.kill()
         parent.join()
