@@ -103,7 +103,7 @@ def test_help_has_everyday_options_first(pns: Any) -> None:
     order = ("Everyday", "--output", "--levels", "--crease", "--scheme", "Files", "--to")
     order += ("Research", "--map", "--budget", "--reference-length", "--diagnostics")
     # At the beginning of a row: options name others in their words.
-    places = [re.search(rf"^[╭│][─ *]*{word}", said, re.MULTILINE).start() for word in order]
+    places = [re.search(rf"^[╭│][─ *]*{word}\b", said, re.MULTILINE).start() for word in order]
     assert places == sorted(places)
 
 
