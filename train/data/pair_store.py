@@ -23,8 +23,8 @@ from train.data.shape_pairs import shape_pairs
 # Points of a procedural surface, at most.
 MOST_POINTS = 20_000
 
-# One in so many procedural pairs is drawn with few sides.
-DRAWN = 5
+# One in so many procedural pairs is drawn with few sides: of triangles, and of polygons.
+DRAWN, DRAWN_POLYGONS = 5, 2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,11 +114,12 @@ def _keep_procedural(folder: Path, count: int, seed: int, polygons: bool) -> lis
 
 
 def _with_drawn(seed: int, polygons: bool) -> Iterator[Pair]:
-    """Yield the stream's pairs, and a body of revolution in place of every fifth."""
+    """Yield the stream's pairs, and bodies of revolution in place of some."""
     rng = np.random.default_rng(seed)
     stream = polygon_stream(seed) if polygons else pair_stream(seed)
+    often = DRAWN_POLYGONS if polygons else DRAWN
     for number in count_from_0():
-        if number % DRAWN:
+        if number % often:
             yield next(stream)
             continue
         pair = drawn_pair(rng)
