@@ -134,7 +134,9 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
       await page.locator("#problem").waitFor();
       const { title, detail } = await refusal("levels=1&scheme=loop", buffer, type);
       assert.equal(await page.textContent("#problem-title"), title);
-      assert.equal(await page.textContent("#problem-detail"), detail);
+      // As a sentence.
+      const said = `${detail[0].toUpperCase()}${detail.slice(1)}.`;
+      assert.equal(await page.textContent("#problem-detail"), said);
       assert.ok(await page.isHidden("#problem-again"));
       assert.ok(await page.isVisible("#welcome"));
     });
