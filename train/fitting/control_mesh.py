@@ -10,7 +10,8 @@ with the order of weights around vertices and s of the fold guard held.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sparse
@@ -31,8 +32,8 @@ from pns_common.operator.scheme import named_scheme
 from pns_common.operator.sharpness import LEAST_SHARPNESS
 from pns_common.parallel import Blocks
 from pns_common.refinement import control_level
-from pns_common.schemes.base_scheme import BaseScheme, in_threes
-from pns_common.schemes.matrix import subdivision_matrix
+from pns_common.schemes.limit import limit_positions
+from pns_common.schemes.matrix import Place, mask_matrix
 from train.fitting.soft_masks import Masks, Spokes
 from train.models.directed import Directed, DirectedNet
 from train.models.recipe import DirectedForm
@@ -78,15 +79,15 @@ class ControlMesh:
         self.directed = Directed.of(topology)
         self.features = torch.from_numpy(directed_features(level, 0, len(topology.edges)))
         self.axes = torch.from_numpy(_axes(level))
-        self._measure_gates(level)
-        self._measure_boundary(level)
         split = self.base.split(topology, Blocks(), inherit=False)
+        self._measure_gates(level, split.vertex_count)
+        self._measure_boundary(level, split.vertex_count)
         last = self.base.split(split, Blocks(), inherit=False)
         self.faces: Int[np.ndarray, "T 3"] = last.corners[fans(last.offsets)[0]].astype(np.int64)
         self.masks = (
-            Masks(_matrix(topology, self.base)),
-            Masks(_matrix(split, self.base)),
-            Masks(_limit_matrix(last, self.base), limit=True),
+            Masks(_matrix(topology, self.base.place)),
+            Masks(_matrix(split, self.base.place)),
+            Masks(_matrix(last, partial(limit_positions, base=self.base)), limit=True),
         )
         self.split_edges = _long(split.edges)
         self.halves, self.children = _halves(self.edges, self.split_edges, len(points))
@@ -94,7 +95,7 @@ class ControlMesh:
         # For the guard alone, without what was measured.
         self.level = Level(level.points, topology, level.base, 1.0, level.blocks)
 
-    def _measure_gates(self, level: Level) -> None:
+    def _measure_gates(self, level: Level, rows: int) -> None:
         mesh, rule = level.topology, self.rule
         jumps = level.edges.jumps
         of_edges = np.tanh(rule.vertex_gate_sharpness * jumps)
@@ -110,7 +111,6 @@ class ControlMesh:
         self.sides = _long(mesh.face_of(half.reshape(-1)).reshape(-1, 2))
         given = rule.gate_sharpness, rule.vertex_gate_sharpness, rule.budget
         given += rule.curve_strength, rule.network_scale, rule.fold_angle
-        rows = self.base.split(mesh, Blocks(), inherit=False).vertex_count
         whole = formula.DirectedRule(_NONE, *given)
         around = formula.surroundings(level, whole, np.zeros((rows, 3)))
         self.flat = torch.from_numpy(around.flat)
@@ -123,10 +123,9 @@ class ControlMesh:
         self.reach = rule.network_scale * torch.from_numpy(np.concatenate(around.lengths))
         self.face_normals = torch.from_numpy(level.normals.copy())
 
-    def _measure_boundary(self, level: Level) -> None:
+    def _measure_boundary(self, level: Level, rows: int) -> None:
         """Measure what the boundary does by itself: displacements, corners, what it shares."""
         mesh, rule, count = level.topology, self.rule, len(level.points)
-        rows = self.base.split(mesh, Blocks(), inherit=False).vertex_count
         curves = self.curves = find_curves(level.points, mesh, rows)
         pushes = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
         along = torch.from_numpy(curve_prior(curves, pushes))
@@ -242,26 +241,10 @@ def _halves(
     return torch.where(is_half, edge, -1), children
 
 
-def _matrix(topology: Topology, base: BaseScheme) -> sparse.csr_array:
-    """Return the masks of one level of a scheme."""
-    made = subdivision_matrix([topology], base)
+def _matrix(topology: Topology, place: Place) -> sparse.csr_array:
+    """Return masks as a matrix: those of one level, or those that lead to the limit surface."""
+    made = mask_matrix(topology, place, Blocks())
     return sparse.csr_array((made.weights, made.columns, made.starts), shape=made.shape)
-
-
-def _limit_matrix(topology: Topology, base: BaseScheme) -> sparse.csr_array:
-    """Return the masks that put a mesh's vertices on the limit surface."""
-    limit = base.limit
-    assert limit is not None
-
-    def place(
-        values: Float[np.ndarray, "V K"], topology: Topology, blocks: Blocks
-    ) -> Float[np.ndarray, "V K"]:
-        def masks(three: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "V 3"]:
-            return limit.positions(three, topology, blocks)
-
-        return in_threes(values, len(values), masks)
-
-    return _matrix(topology, replace(base, place=place))
 
 
 def _long(array: np.ndarray) -> Int[Tensor, "..."]:
