@@ -67,7 +67,7 @@ class DirectedEdges:
 
     @cached_property
     def graph(self) -> Directed:
-        """The same for a network."""
+        """The directed edges as a network reads them."""
         mesh, count = self.around.mesh, len(self.around.mesh.edges)
         faces = torch.where(self.half_edges[:, 0] < 0, len(mesh.faces), self.half_edges[:, 0] // 3)
         reverse = torch.arange(2 * count).roll(count)

@@ -61,7 +61,7 @@ class BoundedNet(nn.Module):
 
 
 class SymmetricNet(BoundedNet):
-    """The same perceptron averaged over a group: z ← mean over g of D_g z(g φ), then projected.
+    """A bounded perceptron averaged over a group: z ← mean over g of D_g z(g φ), then projected.
 
     η(g φ) = D_g η(φ) then holds for any weights, and ‖η‖ ≤ C as before.
     """

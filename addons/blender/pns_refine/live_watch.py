@@ -1,4 +1,4 @@
-"""When live mode refreshes: a while after an edit, and again after undo.
+"""Refreshes of live mode: a while after an edit, and again after undo.
 
 What undo steps do not know of is put away before undo, and found again afterwards.
 """

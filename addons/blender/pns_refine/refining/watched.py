@@ -15,7 +15,7 @@ from pns_common.model.session import Model
 
 @dataclass(frozen=True, eq=False)
 class WatchedModel:
-    """The same model; ``look_up`` is called before each block, and may raise to stop the work."""
+    """A model that calls ``look_up`` before each block, which may raise to stop the work."""
 
     model: Model
     look_up: Callable[[], None]
