@@ -23,8 +23,6 @@ from pns_common.schemes.limit import limit_positions
 
 NOT_THERE = -1
 CHILDREN = 4
-# Names of vertices that are followed and never written.
-UNNAMED = 2**48
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +114,9 @@ class Levels:
     deepest: int
     sharp: int | None
 
-    @property
-    def lasting(self) -> bool:
-        """True where creases and soft edges stay as they are down to the last level."""
-        return self.sharp is None or self.sharp >= self.deepest
+    def lasts(self, depth: int) -> bool:
+        """Return whether creases and soft edges of a level stay as they are, or are gone."""
+        return self.sharp is None or self.sharp >= self.deepest or depth >= self.sharp
 
     def inherit(self, depth: int) -> bool:
         """Return whether the edges of a level are as sharp as those they are halves of."""
@@ -134,7 +131,21 @@ class Levels:
         ``first_name`` on, or NOT_THERE.
         """
         touched = marked(part.topology.faces[split], part.topology.vertex_count)
-        return self._refined(replace(part, exists=split), touched, first_name)
+        around = np.logical_or.reduce(touched[part.topology.faces], axis=1)
+        near, vertices, edges = replace(part, exists=split).of_faces(around)
+        mesh = near.topology
+        names = first_name + np.arange(len(mesh.edges))
+        finer = Part(
+            part.depth + 1,
+            self.base.split(mesh, self.blocks, inherit=self.inherit(part.depth + 1)),
+            self.base.place(near.points, mesh, self.blocks),
+            np.concatenate([near.names, names]),
+            (CHILDREN * near.codes[:, None] + np.arange(CHILDREN)).reshape(-1),
+            np.repeat(near.exists, CHILDREN),
+        )
+        of_edges = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
+        of_edges[edges] = names
+        return finer, Refined(vertices, mesh, np.arange(len(finer.names))), of_edges
 
     def settle(self, part: Part, rows: Integer[np.ndarray, " N"]) -> list[Settled]:
         """Put vertices of faces that exist on the limit.
@@ -151,45 +162,25 @@ class Levels:
         if not moves.any():
             return made
         moving, steps = rows[moves], list[Refined]()
-        names, finer = part.names[moving], replace(part, exists=np.zeros_like(part.exists))
-        while finer.depth < self.deepest:
-            active = marked(moving, finer.topology.vertex_count)
-            finer, step, _ = self._refined(finer, active, UNNAMED)
-            steps.append(step)
-            order = np.argsort(finer.names)
-            moving = order[np.searchsorted(finer.names, names, sorter=order)]
-        return [*made, self._settled(finer, moving, steps)]
+        mesh, vertices = stars(part.topology, moving)
+        points, every, first = part.points[vertices], vertices, np.arange(len(moving))
+        # The neighbours of a centre are the ends of the first half of its edges, a level later.
+        far = mesh.edges.max(axis=1)
+        spokes = np.flatnonzero(mesh.edges.min(axis=1) < len(moving))
+        kept = np.arange(mesh.vertex_count)
+        kept[far[spokes]] = mesh.vertex_count + spokes
+        for depth in range(part.depth, self.deepest):
+            steps.append(Refined(every, mesh, kept))
+            points, every = self.base.place(points, mesh, self.blocks)[kept], np.arange(len(kept))
+            mesh = later(mesh, inherit=self.inherit(depth + 1))
+        limits = limit_positions(points, mesh, self.blocks, self.base)[first]
+        return [*made, Settled(part.names[moving], steps, mesh, first, points, limits)]
 
     def _settled(
         self, part: Part, rows: Integer[np.ndarray, " N"], steps: Sequence[Refined]
     ) -> Settled:
         limits = limit_positions(part.points, part.topology, self.blocks, self.base)[rows]
         return Settled(part.names[rows], steps, part.topology, rows, part.points, limits)
-
-    def _refined(
-        self, part: Part, active: Bool[np.ndarray, " V"], first_name: int
-    ) -> tuple[Part, Refined, Integer[np.ndarray, " E"]]:
-        """Refine what surrounds some vertices, and keep what surrounds them and new ones."""
-        near, vertices, edges = part.of_faces(
-            np.logical_or.reduce(active[part.topology.faces], axis=1)
-        )
-        mesh, count = near.topology, near.topology.vertex_count
-        names = first_name + np.arange(len(mesh.edges))
-        topology = self.base.split(mesh, self.blocks, inherit=self.inherit(part.depth + 1))
-        finer = Part(
-            part.depth + 1,
-            topology,
-            self.base.place(near.points, mesh, self.blocks),
-            np.concatenate([near.names, names]),
-            (CHILDREN * near.codes[:, None] + np.arange(CHILDREN)).reshape(-1),
-            np.repeat(near.exists, CHILDREN),
-        )
-        seen = marked(topology.faces[finer.exists], topology.vertex_count)
-        seen[:count] |= active[vertices]
-        made, kept, _ = finer.of_faces(np.logical_or.reduce(seen[topology.faces], axis=1))
-        of_edges = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
-        of_edges[edges] = names
-        return made, Refined(vertices, mesh, kept), of_edges
 
 
 def cut_out(
@@ -205,15 +196,73 @@ def cut_out(
     made = build_topology(number[corners], len(vertices))
     edges = np.empty(len(made.edges), dtype=np.int64)
     edges[made.corner_edges] = mesh.face_edges[kept].reshape(-1)
+    return with_rules_of(mesh, made, vertices, edges), vertices, edges
+
+
+def with_rules_of(
+    mesh: Topology,
+    made: Topology,
+    vertices: Integer[np.ndarray, " W"],
+    edges: Integer[np.ndarray, " E"],
+) -> Topology:
+    """Return a topology with the sharpness of a mesh, where its vertices and edges are known."""
     made = made.with_creases(np.flatnonzero(mesh.edge_class[edges] == connectivity.CREASE))
     if len(mesh.soft):
         soft = np.where(made.edge_class == connectivity.INTERIOR, mesh.soft[edges], 0.0)
         made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+    if len(mesh.wear):
+        whole = made.edge_class != connectivity.BOUNDARY
+        wear = np.where(whole, mesh.wear[edges], 0.0)
+        made = replace(made, wear=wear if wear.any() else NO_WEIGHTS)
     if len(mesh.vertex_sharpness):
         made = made.with_vertex_sharpness(mesh.vertex_sharpness[vertices])
     if len(mesh.soft_corners):
         made = made.with_soft_corners(mesh.soft_corners[vertices])
-    return made, vertices, edges
+    return made
+
+
+def stars(
+    mesh: Topology, rows: Integer[np.ndarray, " N"]
+) -> tuple[Topology, Integer[np.ndarray, " W"]]:
+    """Return the faces around each of some vertices as a mesh, and which vertices its own are.
+
+    No two vertices share a face there. The given ones come first.
+    """
+    number = np.full(mesh.vertex_count, -1)
+    number[rows] = np.arange(len(rows))
+    corners = np.flatnonzero(number[mesh.corners] >= 0)
+    at, star = (
+        np.stack(
+            [
+                corners,
+                corners - corners % 3 + (corners + 1) % 3,
+                corners - corners % 3 + (corners + 2) % 3,
+            ],
+            1,
+        ),
+        number[mesh.corners[corners]],
+    )
+    keys = star[:, None] * mesh.vertex_count + mesh.corners[at[:, 1:]]
+    ring, of_corner = np.unique(keys, return_inverse=True)
+    faces = np.column_stack([star, len(rows) + of_corner.reshape(-1, 2)])
+    vertices = np.concatenate([rows, ring % mesh.vertex_count])
+    made = build_topology(faces.astype(np.uint32), len(vertices))
+    edges = np.empty(len(made.edges), dtype=np.int64)
+    edges[made.corner_edges] = mesh.corner_edges[at].reshape(-1)
+    return with_rules_of(mesh, made, vertices, edges), vertices
+
+
+def later(mesh: Topology, *, inherit: bool) -> Topology:
+    """Return the same stars with the sharpness that they have a level later."""
+    if inherit and not len(mesh.wear) and not len(mesh.vertex_sharpness):
+        return mesh
+    if not inherit:
+        weights = mesh.soft_corners_of_split(mesh.vertex_count, inherit=False)
+        sharp = mesh.vertex_sharpness
+        mesh = replace(mesh.without_creases(), soft_corners=weights, vertex_sharpness=sharp)
+    mesh = replace(mesh, vertex_sharpness=mesh.worn_vertices(mesh.vertex_count))
+    halves = np.arange(len(mesh.edges))[:, None].repeat(2, axis=1)
+    return mesh.worn(mesh, halves)
 
 
 def unsettled(mesh: Topology, levels: Levels) -> Bool[np.ndarray, " V"]:
@@ -221,10 +270,12 @@ def unsettled(mesh: Topology, levels: Levels) -> Bool[np.ndarray, " V"]:
     made = np.zeros(mesh.vertex_count, dtype=bool)
     if len(mesh.soft):
         made[mesh.edges[mesh.soft > 0]] = True
+    if len(mesh.wear):
+        made[mesh.edges[(mesh.wear > 0) & np.isfinite(mesh.wear)]] = True
     if len(mesh.soft_corners):
         made |= (mesh.soft_corners > 0) & (mesh.soft_corners < 1)
     if len(mesh.vertex_sharpness):
         made |= (mesh.vertex_sharpness > 0) & np.isfinite(mesh.vertex_sharpness)
-    if not levels.lasting:
+    if not levels.lasts(0):
         made[mesh.edges[mesh.crease_edges]] = True
     return made

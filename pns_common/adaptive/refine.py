@@ -17,7 +17,6 @@ from pns_common.adaptive.certificate import distances
 from pns_common.adaptive.parts import CHILDREN, Levels, Part, Refined, Settled
 from pns_common.adaptive.tree import (
     DIGITS,
-    Codes,
     Flags,
     Goal,
     Start,
@@ -234,13 +233,12 @@ def refine_to_goal(
 
 def _near_enough(start: Start) -> Tree:
     """Return a tree that reaches the tolerance, and whose faces can be cut to meet."""
-    forced: Codes | None = None
+    tree = start.grow(1.0)
     while True:
-        tree = start.grow(1.0, forced)
         closed = tree.closed(tree.split, start.goal.tolerance)
         if _same(tree.split, closed):
             return tree
-        forced = tree.codes(closed)
+        tree = start.grow(1.0, tree.codes(closed), known=tree)
 
 
 def _with_so_many(start: Start) -> Tree:
@@ -254,7 +252,7 @@ def _with_so_many(start: Start) -> Tree:
         if made > most or left <= least:
             break
         threshold = max(min(threshold * max(SMALLER, made / most), left * BELOW), least)
-        tree = start.grow(threshold)
+        tree = start.grow(threshold, known=tree)
     order = _worst_first(tree)
     low, high = 0, len(order) + 1
     while high - low > 1:
@@ -262,7 +260,7 @@ def _with_so_many(start: Start) -> Tree:
         fits = tree.count(tree.closed(_flagged(tree, order[:middle]))) <= most
         low, high = (middle, high) if fits else (low, middle)
     split = tree.closed(_flagged(tree, order[:low]))
-    return start.grow(threshold, tree.codes(split), only=True)
+    return start.grow(threshold, tree.codes(split), only=True, known=tree)
 
 
 def _largest_left(tree: Tree, deepest: int) -> float:

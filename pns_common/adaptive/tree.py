@@ -23,12 +23,8 @@ from pns_common.adaptive.parts import (
     Refined,
     Settled,
 )
-from pns_common.kernels.flatness import COLUMNS
 from pns_common.mesh.rows import marked
 
-# Faces are measured once more unless their error is below SPARE thresholds, so that they can be cut
-# in two at any side, or above NEAR thresholds, so that they are to be split in all likelihood.
-SPARE, NEAR = 1 / 2, 4.0
 # Errors that agree in so many digits are equal.
 DIGITS = 9
 Flags = Sequence[Bool[np.ndarray, " _"]]
@@ -72,7 +68,7 @@ class Layer:
     Attributes:
         part: the faces, and those around them.
         split: (F,) which faces are split.
-        errors, slabs: (F,), (F, 14) of those that exist; 0 elsewhere.
+        errors, slabs: (F,), (F, 3) of those that exist; 0 elsewhere.
         middles: (E,) the name of the vertex on each edge at the next level, or NOT_THERE.
         step: from this level to the next; None at the last.
         settled: vertices that are in no level before.
@@ -81,7 +77,7 @@ class Layer:
     part: Part
     split: Bool[np.ndarray, " F"]
     errors: Float[np.ndarray, " F"]
-    slabs: Float[np.ndarray, "F 14"]
+    slabs: Float[np.ndarray, "F 3"]
     middles: Integer[np.ndarray, " E"]
     step: Refined | None
     settled: Sequence[Settled]
@@ -181,59 +177,55 @@ class Start:
     goal: Goal
     tell: Callable[[int], None]
 
-    def grow(self, threshold: float, forced: Codes | None = None, *, only: bool = False) -> Tree:
+    def grow(
+        self,
+        threshold: float,
+        forced: Codes | None = None,
+        *,
+        only: bool = False,
+        known: Tree | None = None,
+    ) -> Tree:
         """Split the faces whose error is above a threshold, and those that are forced.
-
-        A face is measured by its own control points, by those of its children if that leaves it
-        uncertain whether it may stay or be cut, and by those of theirs if these come near.
 
         Args:
             threshold: of errors.
             forced: codes of faces that are split in any case, level by level.
             only: split no others.
+            known: a tree of the same start, whose faces need not be measured again.
         """
         part, names = self.control, len(self.control.points)
-        places, layers = np.full((names, 3), np.nan), list[_Growing]()
-        pending = np.zeros(part.topology.face_count, dtype=bool)
+        places, layers = np.full((names, 3), np.nan), list[Layer]()
         for depth in range(self.levels.deepest + 1):
-            layer = _Growing(part)
-            layers.append(layer)
             self.tell(int(part.exists.sum()))
-            learned = self.first is not None and depth == 0
-            if not learned:
-                layer.settled = self._settle(part, places)
-                self._measure(layer, part.exists, places)
-            must = np.zeros(part.topology.face_count, dtype=bool)
-            if forced is not None and depth < len(forced):
-                must = part.exists & np.isin(part.codes, forced[depth])
-            asked = must | (layer.errors > SPARE * threshold) | (learned & part.exists)
-            if depth:
-                asked |= np.isin(part.codes // CHILDREN, layers[-2].part.codes[pending])
-            if depth == self.levels.deepest or not asked.any():
-                break
-            if learned and self.first is not None:
-                finer, layer.step = self.first
-                layer.middles = names + np.arange(len(part.topology.edges))
-                places = _longer(places, len(layer.middles))
-                layer.settled = self._settle(finer, places)
+            finer, step, middles, settled = None, None, self._no_middles(part), list[Settled]()
+            if self.first is not None and depth == 0:
+                finer, step = self.first
+                middles = names + np.arange(len(part.topology.edges))
+                places = _longer(places, len(middles))
+                settled = self._settle(finer, places)
             else:
-                finer, layer.step, layer.middles = self.levels.split(part, asked, names)
-                places = _longer(places, len(layer.step.topology.edges))
-            names = len(places)
-            if depth and pending.any():
-                self._measure(layers[-2], pending, places, finer, 2)
-                above = layers[-2]
-                above.split &= ~pending | above.must | (above.errors > threshold)
-                part = layer.part = replace(part, exists=_children(part, above))
-            self._measure(layer, asked & part.exists, places, finer, 1)
-            layer.must = must & part.exists
-            layer.split = layer.must | (part.exists & (layer.errors > threshold) & (not only))
-            near = (layer.errors > SPARE * threshold) & (layer.errors <= NEAR * threshold)
-            pending = part.exists & ~must & near
-            part = replace(finer, exists=_children(finer, layer))
-            if not (layer.split.any() or pending.any()):
+                settled = self._settle(part, places)
+            old = known.layers[depth] if known is not None and depth < len(known.layers) else None
+            errors, slabs = self._measured(part, places, finer, old)
+            split = part.exists & (errors > threshold) & (not only)
+            if forced is not None and depth < len(forced):
+                split |= part.exists & np.isin(part.codes, forced[depth])
+            split &= depth < self.levels.deepest
+            if split.any():
+                if finer is not None:
+                    finer = replace(finer, exists=np.repeat(split, CHILDREN))
+                else:
+                    finer, step, middles = self.levels.split(part, split, names)
+                    places = _longer(places, len(step.topology.edges))
+                names = len(places)
+            layers.append(Layer(part, split, errors, slabs, middles, step, settled))
+            if finer is None or not split.any():
                 break
-        return Tree([layer.done() for layer in layers], places)
+            part = finer
+        return Tree(layers, places)
+
+    def _no_middles(self, part: Part) -> Integer[np.ndarray, " E"]:
+        return np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
 
     def _settle(self, part: Part, places: Float[np.ndarray, "N 3"]) -> list[Settled]:
         """Put vertices of faces that exist, and are not yet there, on the limit."""
@@ -245,55 +237,36 @@ class Start:
             places[own.names] = own.limits
         return made
 
-    def _measure(
+    def _measured(
         self,
-        layer: _Growing,
-        faces: Bool[np.ndarray, " F"],
+        part: Part,
         places: Float[np.ndarray, "N 3"],
-        finer: Part | None = None,
-        deeper: int = 0,
-    ) -> None:
-        """Measure faces by those of a part that is so many levels deeper, and keep what is less."""
-        rows = np.flatnonzero(faces)
-        if len(rows) == 0:
-            return
-        part, each = layer.part, int(CHILDREN**deeper)
-        triangles = places[part.names[part.topology.faces[rows]]]
-        of_finer = rows
-        if finer is not None:
-            codes = each * part.codes[rows, None] + np.arange(each)
-            of_finer = np.searchsorted(finer.codes, codes)
-        sides = layer.folded[rows]
-        made = slabs(finer or part, of_finer, triangles, sides, self.levels, deeper)
-        known, old = layer.measured[rows], layer.slabs[rows]
-        made[known, ::2] = np.maximum(made[known, ::2], old[known, ::2])
-        made[known, 1::2] = np.minimum(made[known, 1::2], old[known, 1::2])
-        layer.slabs[rows], layer.measured[rows] = made, True
-        layer.errors[rows] = self.goal.errors(distances(made), triangles)
+        finer: Part | None,
+        known: Layer | None,
+    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
+        """Return errors and slabs of faces that exist, of those of the next level if it is given.
 
-
-class _Growing:
-    """A layer that is being made; attributes as of ``Layer``."""
-
-    def __init__(self, part: Part) -> None:
-        """Begin with nothing measured and nothing split."""
-        count, none = part.topology.face_count, np.zeros(part.topology.face_count, dtype=bool)
-        self.part, self.folded = part, folded(part)
-        self.split, self.must, self.measured = none.copy(), none.copy(), none.copy()
-        self.errors, self.slabs = np.zeros(count), np.zeros((count, COLUMNS))
-        self.middles = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
-        self.step: Refined | None = None
-        self.settled: list[Settled] = []
-
-    def done(self) -> Layer:
-        """Return what was made."""
-        made = self.errors, self.slabs, self.middles, self.step, self.settled
-        return Layer(self.part, self.split, *made)
-
-
-def _children(finer: Part, layer: _Growing) -> Bool[np.ndarray, " F"]:
-    """Return the faces of a part that are children of split faces."""
-    return finer.exists & np.isin(finer.codes // CHILDREN, layer.part.codes[layer.split])
+        Those that are known are taken from a layer of another tree.
+        """
+        count = part.topology.face_count
+        errors, made, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
+        if known is not None:
+            codes = known.part.codes
+            there = np.minimum(np.searchsorted(codes, part.codes[rows]), len(codes) - 1)
+            same = (codes[there] == part.codes[rows]) & known.part.exists[there]
+            errors[rows[same]], made[rows[same]] = (
+                known.errors[there[same]],
+                known.slabs[there[same]],
+            )
+            rows = rows[~same]
+        if len(rows):
+            triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
+            of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
+            enough = self.goal.tolerance or 0.0
+            asked = triangles, folded(part)[rows], self.levels, int(deeper), enough
+            made[rows] = slabs(finer or part, of_finer, *asked)
+            errors[rows] = self.goal.errors(distances(made[rows]), triangles)
+        return errors, made
 
 
 def _longer(places: Float[np.ndarray, "N 3"], more: int) -> Float[np.ndarray, "M 3"]:
