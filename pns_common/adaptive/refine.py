@@ -21,6 +21,7 @@ from pns_common.adaptive.tree import (
     Goal,
     Start,
     Tree,
+    edges_of,
     sides_split,
 )
 from pns_common.errors import MeshError, ParameterError
@@ -379,9 +380,9 @@ def _faces_of(tree: Tree, depth: int) -> _Faces:
     rows = np.flatnonzero(part.exists & ~layer.split)
     cut = sides_split(layer, layer.split)[rows] > 0
     codes, distance = part.codes[rows], distances(layer.slabs[rows])
-    distance[cut] = tree.cut_distances(depth, rows[cut], layer.split)
+    distance[cut] = tree.cut_distances(depth, rows[cut], edges_of(layer, layer.split))
     names, weights = part.names[mesh.faces[rows]], _weights(codes, depth)
-    divided = marked(mesh.face_edges[layer.split], len(mesh.edges))[mesh.face_edges[rows[cut]]]
+    divided = edges_of(layer, layer.split)[mesh.face_edges[rows[cut]]]
     # From a corner a, before the side that is cut at m: (a, m, c) and (m, b, c).
     turn = (divided.argmax(axis=1)[:, None] + np.arange(3)) % 3
     own = np.arange(len(turn))

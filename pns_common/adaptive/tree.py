@@ -115,30 +115,35 @@ class Tree:
         made = [own.copy() for own in split]
         for depth in reversed(range(len(made))):
             layer, own = self.layers[depth], made[depth]
+            edges, hit = layer.part.topology.face_edges, edges_of(layer, own)
+            rows = np.arange(len(own))
             while True:
-                sides = sides_split(layer, own)
-                more = ~own & (sides > 1)
+                sides = _sum(hit, edges[rows])
+                more = sides > 1
                 if widest is not None:
-                    cut = np.flatnonzero(~own & (sides == 1) & layer.part.exists)
-                    more[cut] = self.cut_distances(depth, cut, own) > widest
-                if not more.any():
+                    cut = np.flatnonzero((sides == 1) & ~own[rows] & layer.part.exists[rows])
+                    more[cut] = self.cut_distances(depth, rows[cut], hit) > widest
+                new = rows[more & ~own[rows]]
+                if len(new) == 0:
                     break
-                own |= more
+                own[new] = True
+                fresh = marked(edges[new], len(hit)) & ~hit
+                hit |= fresh
+                rows = np.flatnonzero(_sum(fresh, edges))
             if depth:
                 # Such a face exists, or is split or cut, only where its parent is split.
-                asked = layer.part.codes[own | (sides > 0)] // CHILDREN
+                asked = layer.part.codes[own | (_sum(hit, edges) > 0)] // CHILDREN
                 above = self.layers[depth - 1].part.codes
                 made[depth - 1][np.searchsorted(above, asked)] = True
         return made
 
     def cut_distances(
-        self, depth: int, rows: Integer[np.ndarray, " N"], split: Bool[np.ndarray, " F"]
+        self, depth: int, rows: Integer[np.ndarray, " N"], hit: Bool[np.ndarray, " E"]
     ) -> Float[np.ndarray, " N"]:
-        """Return how far the limit surface can be from faces of one cut side, cut in two."""
+        """Return how far the limit surface can be from faces of one flagged edge, cut in two."""
         layer = self.layers[depth]
         mesh, names = layer.part.topology, layer.part.names
-        sides = marked(mesh.face_edges[split], len(mesh.edges))[mesh.face_edges[rows]]
-        edge = mesh.face_edges[rows, sides.argmax(axis=1)]
+        edge = mesh.face_edges[rows, hit[mesh.face_edges[rows]].argmax(axis=1)]
         middle = layer.middles[edge]
         there = np.where((middle == NOT_THERE)[:, None], np.nan, self.places[middle])
         return cut_distances(layer.slabs[rows], self.places[names[mesh.faces[rows]]], there)
@@ -153,10 +158,23 @@ class Tree:
         return self.layers[0].part.topology.face_count + (CHILDREN - 1) * divided + cut
 
 
+def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " E"]:
+    """Return which edges are sides of split faces."""
+    mesh = layer.part.topology
+    return marked(mesh.face_edges[split], len(mesh.edges))
+
+
 def sides_split(layer: Layer, split: Bool[np.ndarray, " F"]) -> Integer[np.ndarray, " F"]:
     """Return how many sides of each face are those of split faces."""
-    mesh = layer.part.topology
-    return marked(mesh.face_edges[split], len(mesh.edges))[mesh.face_edges].sum(axis=1)
+    return _sum(edges_of(layer, split), layer.part.topology.face_edges)
+
+
+def _sum(
+    flags: Bool[np.ndarray, " E"], edges: Integer[np.ndarray, "F 3"]
+) -> Integer[np.ndarray, " F"]:
+    """Return how many edges of each face are flagged."""
+    a, b, c = (flags[edges[:, k]].view(np.int8) for k in range(3))
+    return a + b + c
 
 
 @dataclass(frozen=True, eq=False)
