@@ -17,6 +17,7 @@ from pns_common.adaptive.parts import CHILDREN, Levels, Part
 from pns_common.kernels import connectivity
 from pns_common.kernels import flatness as kernels
 from pns_common.mesh.creases import edge_cosines
+from pns_common.mesh.rows import marked
 from pns_common.schemes.loop_weights import beta
 
 # The side of a face that each side of its children is half of, from (a, ab, ca) on, or NO_SIDE.
@@ -129,26 +130,42 @@ def _measured(
         kernels.measure_faces(*read, *rings, *asked, begin, end, numbers, whole, made)
 
     levels.blocks.quiet().run(len(faces), work)
-    for i in np.flatnonzero(made[:, UNKNOWN]):
-        # Few faces: where fans of several kinds meet, or of very many faces.
-        made[i, :UNKNOWN] = _around(part, mesh.faces[faces[i]], triangles[i], compared[i])
+    # Where fans of several kinds meet, or of very many faces.
+    rows = np.flatnonzero(made[:, UNKNOWN])
+    if len(rows):
+        about = triangles.reshape(-1, 3, 3)[rows]
+        made[rows, :UNKNOWN] = _hulls(part, mesh.faces[faces[rows]], about, compared[rows])
     return made
 
 
-def _around(
+def _hulls(
     part: Part,
-    corners: Integer[np.ndarray, " 3"],
-    triangle: Float[np.ndarray, "3 3"],
-    compared: Integer[np.ndarray, " 3"],
-) -> tuple[float, float, float]:
-    """Return the slab of a face by all control points around its corners."""
-    edges = part.topology.edges[np.isin(part.topology.edges, corners).any(axis=1)]
-    used = part.points[np.unique(edges)]
-    away = np.linalg.norm(used[:, None] - triangle, axis=2).max()
-    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-    length = float(np.linalg.norm(normal))
-    side = float(away) if (compared >= 0).any() else 0.0
-    if not length > 0:
-        return 0.0, float(away), side
-    heights = (used - triangle[0]) @ normal / length
-    return min(float(heights.min()), 0.0), max(float(heights.max()), 0.0), side
+    corners: Integer[np.ndarray, "N 3"],
+    triangles: Float[np.ndarray, "N 3 3"],
+    compared: Integer[np.ndarray, "N 3"],
+) -> Float[np.ndarray, "N 3"]:
+    """Return slabs of faces by all control points around their corners."""
+    ends = part.topology.edges.astype(np.int64)
+    ends = ends[marked(corners, part.topology.vertex_count)[ends].any(axis=1)]
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    flat = corners.reshape(-1).astype(np.int64)
+    begin, end = (np.searchsorted(ends[:, 0], flat, side=side) for side in ("left", "right"))
+    counts = end - begin
+    at = np.arange(counts.sum()) + np.repeat(begin - np.cumsum(counts) + counts, counts)
+    face = np.repeat(np.arange(len(flat)) // 3, counts)
+    to = part.points[ends[at, 1]] - triangles[face, 0]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals /= np.where(lengths > 0, lengths, 1.0)[:, None]
+    heights, made = np.einsum("ij,ij->i", to, normals[face]), np.zeros((len(corners), 3))
+    np.minimum.at(made[:, LOW], face, heights)
+    np.maximum.at(made[:, HIGH], face, heights)
+    # No plane, or a side: a corner of it is not farther than what is around any of the corners.
+    away = np.zeros(len(corners))
+    for corner in range(3):
+        reach = np.linalg.norm(to + triangles[face, 0] - triangles[face, corner], axis=1)
+        np.maximum.at(away, face, reach)
+    made[:, HIGH] = np.where(lengths > 0, made[:, HIGH], away)
+    made[:, SIDE] = np.where((compared >= 0).any(axis=1), away, 0.0)
+    return made

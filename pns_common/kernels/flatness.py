@@ -51,7 +51,7 @@ from pns_common.kernels.vectors import (
 )
 
 # Faces are refined so often, and have neighbours of so many neighbours at most.
-DEEPEST, MOST = 3, 40
+DEEPEST, MOST = 4, 40
 # Of a star: its centre, and the weights of the rules of curves and corners there.
 CENTRE, SECOND, THIRD, WIDTH = MOST, MOST, MOST + 1, MOST + 2
 DEGREE, GAP = 0, 1
