@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pns_common import Mesh, MeshError, ParameterError, load_model, loop, pns, refine
+from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
 from pns_common.mesh.topology import EdgeClass
 from tests.support.meshes import (
     bent,
@@ -75,6 +75,24 @@ def test_vertices_are_where_whole_levels_put_them(name, scheme):
             at = own[away.argmin()]
             np.testing.assert_allclose(made.normals[corner], whole.normals[at], atol=1e-9)
     assert made.mesh.face_count <= whole.mesh.face_count
+
+
+@pytest.mark.parametrize("sharpness", [1.0, 1.5, np.inf])
+def test_edges_that_wear_off_do_so_in_parts_of_levels(sharpness):
+    points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
+    mesh = Mesh(points, faces)
+    pairs = mesh.topology().edges[::4].astype(np.int64)
+    creases = Creases(pairs, np.full(len(pairs), sharpness), wears=True)
+    made = refine(mesh, "loop", LEVELS, tolerance="1%", creases=creases)
+    whole = refine(mesh, "loop", LEVELS, creases=creases).mesh.vertices
+    away, _ = cKDTree(whole).query(made.mesh.vertices)
+    assert away.max() < 1e-12
+
+
+def test_vertices_of_many_faces_are_bounded():
+    made = refine(drum(44), "loop", LEVELS, tolerance="1%", creases=None)
+    assert (made.distances[made.face_levels < LEVELS] <= made.goal.tolerance).all()
+    assert np.isfinite(made.distances).all()
 
 
 @pytest.mark.parametrize("name", SHAPES)
