@@ -1,7 +1,7 @@
 """Bodies drawn with few sides: cones, spindles, drums and what lies between; and balls.
 
-From `ROUND` sides on bodies of revolution stand for the round body through their corners, whose tips and rims are
-sharp; with fewer sides they are meant as they are.
+From `ROUND` sides on bodies of revolution stand for the round body through their corners, whose
+tips and rims are sharp; with fewer sides they are meant as they are.
 """
 
 import numpy as np
