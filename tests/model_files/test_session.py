@@ -71,7 +71,7 @@ def test_a_rows_bits_depend_on_nothing_but_the_row():
     """Not on how many rows there are, nor on where in a chunk it stands."""
     for model, given, width in (
         (random_model(0), "features", 5),
-        (default_model(0), "messages_1", 48),
+        (default_model(0), "messages_1", 28),
     ):
         features, ask = rows(2 * CHUNK_ROWS + 17, width), partial(model.run, given)
         whole = ask(features)
