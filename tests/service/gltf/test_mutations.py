@@ -1,4 +1,7 @@
-"""Broken files by the thousand: whatever the bytes, the answer is a result or a named refusal."""
+"""Broken files by the hundred: whatever the bytes, the answer is a result or a named refusal.
+
+`make fuzz` takes as many as one likes.
+"""
 
 import json
 import random
@@ -13,7 +16,7 @@ from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)
-BINARY_MUTANTS, JSON_MUTANTS, TRUNCATIONS = 1500, 1500, 1000
+BINARY_MUTANTS, JSON_MUTANTS, TRUNCATIONS = 400, 400, 300
 
 
 def sample():
@@ -56,12 +59,12 @@ def test_the_sample_itself_is_refined():
     assert outcome(files.pack(*sample())) == "refined"
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_flipped_bits_give_results_or_named_refusals(seed):
     rng = random.Random(seed)
     whole = files.pack(*sample())
     seen = set()
-    for _ in range(BINARY_MUTANTS // 4):
+    for _ in range(BINARY_MUTANTS // 2):
         mutant = bytearray(whole)
         for _ in range(rng.choice([1, 1, 2, 8, 64])):
             mutant[rng.randrange(len(mutant))] ^= 1 << rng.randrange(8)
@@ -113,12 +116,12 @@ NUMBERS = [
 VALUES = [*NUMBERS, 0.5, -1e308, None, True, "", "POSITION", "data:,", [], [0], {}, {"a": []}]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_replaced_json_values_give_results_or_named_refusals(seed):
     rng = random.Random(seed)
     tree, binary = sample()
     seen = set()
-    for _ in range(JSON_MUTANTS // 4):
+    for _ in range(JSON_MUTANTS // 2):
         mutant = json.loads(json.dumps(tree))
         for _ in range(rng.choice([1, 1, 1, 2, 4])):
             holder, key = rng.choice(list(places(mutant)))

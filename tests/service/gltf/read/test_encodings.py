@@ -198,7 +198,7 @@ def plain(mesh):
 def test_every_storage_is_refined_as_its_plain_twin_and_is_valid(tmp_path):
     written = []
 
-    @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=150)
+    @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=60)
     @given(st.lists(primitive(), min_size=1, max_size=3), st.integers(1, 3))
     def check(mesh, nodes):
         result, twin = refine(stored(mesh, nodes)), refine(plain(mesh))
@@ -231,20 +231,6 @@ def test_every_storage_is_refined_as_its_plain_twin_and_is_valid(tmp_path):
     check()
     assert len(written) > 20
     assert not {code for codes in validator.errors(written) for code in codes}
-
-
-def test_the_instances_of_a_mesh_are_refined_once():
-    shape = {
-        "mode": 5,
-        "index_kind": None,
-        "corners": np.arange(6),
-        "attributes": {"POSITION": (np.arange(18, dtype=np.int8).reshape(6, 3) ** 2 % 7, False)},
-        "gaps": {"POSITION": 2},
-        "sparse": {"POSITION": "all"},
-    }
-    report = refine(stored([shape], 3)).report
-    assert report["totals"]["faces"] == 16
-    assert report["meshes"][0]["instances"] == 3
 
 
 @pytest.mark.parametrize(
@@ -299,14 +285,6 @@ def test_matrices_keep_their_padded_columns(kind, size):
     first = content[view["byteOffset"] :][: size * step]
     columns = np.stack([np.frombuffer(first, dtype, size, step * n) for n in range(size)])
     assert columns.tolist() in values.tolist()
-
-
-def test_a_strip_joined_by_degenerate_triangles_drops_them():
-    points = np.random.default_rng(0).random((8, 3))
-    shape = {"POSITION": points, "indices": np.array([0, 1, 2, 3, 3, 4, 4, 5, 6, 7]), "mode": 5}
-    report = refine(files.glb([shape])).report
-    assert report["dropped"]["degenerate_faces"] == 4
-    assert report["totals"]["faces"] == 16
 
 
 def test_quantisation_stays_declared_where_something_still_needs_it():

@@ -83,12 +83,6 @@ def test_odd_strides_are_read_as_they_say(stride):
     assert "byteStride" in words
 
 
-@pytest.mark.parametrize("stride", [None, 4, 8, 252])
-def test_even_strides_are_no_breach(stride):
-    made = refine(with_identifiers(stride=stride)[0])
-    assert found(made) == []
-
-
 def first_rows(attributes):
     """Return the old vertex that each of the first six refined ones is: that of its axis."""
     points = attributes["POSITION"][:6]
