@@ -1,4 +1,4 @@
-"""Broken mesh files by the thousand: whatever the bytes, a result or a named refusal."""
+"""Broken mesh files by the hundred: whatever the bytes, a result or a named refusal."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from pns_common.operator.scheme import loop
 from service.errors import ServiceError
 from service.meshfiles import formats
 from service.meshfiles.convert import converted
-from service.meshfiles.formats import read_within
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 
 LIMITS = Limits(max_faces=20_000, max_memory_bytes=64 * 2**20)
 OPTIONS = Options(scheme="loop")
-MUTANTS = 150
+MUTANTS = 60
 WORDS = [
     *(b"0", b"-1", b"3", b"255", b"99999999999", b"9" * 25, b"9" * 5000, b"1e39", b"1e400"),
     *(b"nan", b"-inf", b"1e-320", b"0x10", b"1_0", b"\xff\xfe", b"\xe9t\xe9", b"\0", b"", b"#"),
@@ -94,12 +93,6 @@ def cut(data: bytes, rng: random.Random) -> bytes:
     return data[: rng.randrange(len(data))]
 
 
-@pytest.mark.parametrize("name", samples())
-def test_the_samples_themselves_are_refined(name: str) -> None:
-    kind, data = samples()[name]
-    assert outcome(data, kind) == "refined"
-
-
 @pytest.mark.parametrize("change", [flipped, reworded, cut])
 @pytest.mark.parametrize("name", samples())
 def test_broken_files_give_results_or_named_refusals(
@@ -112,31 +105,3 @@ def test_broken_files_give_results_or_named_refusals(
     # A bit of a binary STL is a bit of a position.
     assert "unreadable" in seen or (name, change) == ("stl", flipped)
     assert {status_of(mutant, kind) for mutant in mutants} <= {200, 400, 413, 422}
-
-
-@pytest.mark.parametrize("vertex", ["-1", "3", "4294967299"])
-@pytest.mark.parametrize(
-    ("kind", "text"),
-    [
-        ("off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 {}\n"),
-        (
-            "ply",
-            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-            "property float z\nelement face 2\nproperty list uchar int64 vertex_indices\n"
-            "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 {}\n",
-        ),
-    ],
-)
-def test_a_face_of_a_vertex_that_there_is_not_is_named(kind: str, text: str, vertex: str) -> None:
-    data = text.format(vertex).encode()
-    if kind == "ply":
-        data = data.replace(b"int64", b"int" if int(vertex) < 2**31 else b"double")
-    with pytest.raises(ServiceError, match=r"face 1 of the (OFF|PLY) file names vertex") as refusal:
-        read_within(data, kind, LIMITS)
-    assert refusal.value.status == 422
-
-
-def test_a_file_of_lines_has_no_faces() -> None:
-    data = b"OFF\n0 2 0\n0 0 0\n1 0 0\n"
-    with pytest.raises(ServiceError, match="no faces of three vertices"):
-        read_within(data, "off", LIMITS)
