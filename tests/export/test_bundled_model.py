@@ -10,7 +10,6 @@ import export.run
 from export.model_file import RECORDED, checkpoint_card
 from export.run import FILE_OF_RECIPE
 from pns_common import load_model, pns
-from pns_common.model.file import DEFAULT_MODEL, bundled_models
 from train.data.datasets import ridge_held_out
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import fit
@@ -29,11 +28,6 @@ BY_MODEL = {path.stem: recipe for recipe, path in FILE_OF_RECIPE.items()}
 QUICK = ("paper", "signed")
 
 each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
-
-
-def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
-    assert sorted(BY_MODEL) == bundled_models(companions=True)
-    assert DEFAULT_MODEL in BY_MODEL
 
 
 # The nearest points of 32,768 faces on each of ten ridges: seven seconds, and on spheres forty.

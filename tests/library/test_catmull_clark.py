@@ -22,11 +22,8 @@ from tests.support.polygons import (
     polygon_soups,
     quad_grid,
     quad_star,
-    quad_torus,
     uneven,
 )
-
-NO_CREASES = np.zeros((0, 2), dtype=int)
 
 
 def slow_step(points, faces, sharpness):
@@ -272,17 +269,6 @@ def test_a_regular_grid_is_the_bicubic_b_spline():
         for j in range(1, 5):
             expected = np.einsum("i,j,ijk->k", mask, mask, table[i - 1 : i + 2, j - 1 : j + 2])
             np.testing.assert_allclose(refined.vertices[6 * i + j], expected, atol=1e-15)
-
-
-@pytest.mark.parametrize("threads", [2, 3])
-def test_threads_change_no_bit(threads):
-    points, faces = quad_torus(96, 64)
-    one, several = (
-        refine(Mesh(points, faces), catmull_clark(), 2, threads=n) for n in (1, threads)
-    )
-    np.testing.assert_array_equal(several.mesh.vertices, one.mesh.vertices)
-    np.testing.assert_array_equal(several.mesh.faces, one.mesh.faces)
-    assert several.report == one.report
 
 
 # --- front doors ----------------------------------------------------------------------------------

@@ -6,14 +6,8 @@ import pytest
 from pns_common.mesh.topology import build_topology
 from pns_common.model.card import EDGE_FEATURES
 from pns_common.model.features import (
-    EDGE_GROUPS,
     FEATURE_SETS,
-    HALF_TURN,
-    MIRROR,
     TURN_OVER,
-    Feature,
-    FeatureSet,
-    symmetries,
 )
 from pns_common.operator.formula import PaperRule, edge_inputs
 from pns_common.operator.level import Level
@@ -39,22 +33,6 @@ def test_the_symmetries_are_a_group_of_involutions(name):
             # First one, then the other: again one of them.
             both = (order[other], more * signs[other], local * too)
             assert tuple(map(tuple, both)) in known
-
-
-def test_a_half_turn_renames_the_ends_and_the_sides():
-    features = [Feature("log", side) for side in ("ac", "bc", "ad", "bd")]
-    features += [Feature("tilt", end, half_turn=-1) for end in "ab"]
-    features += [Feature("span", "cd")]  # of two that change places
-    group = symmetries(features, [HALF_TURN])
-    assert group.order[1].tolist() == [3, 2, 1, 0, 5, 4, 6]
-    assert group.signs[1].tolist() == [1, 1, 1, 1, -1, -1, 1]
-    assert group.local[1].tolist() == [-1, 1, -1]
-
-
-def test_rotations_of_the_frame_keep_its_orientation_and_mirrors_turn_it():
-    assert np.prod(HALF_TURN.local) == 1
-    assert np.prod(TURN_OVER.local) == 1
-    assert np.prod(MIRROR.local) == -1
 
 
 def edges_of(points, faces, name):
@@ -112,31 +90,6 @@ def test_other_numbers_of_the_ends_are_a_half_turn(name):
         again, frame = other[count - 1 - b, count - 1 - a]
         np.testing.assert_allclose(again, group.signs[1] * phi[group.order[1]], atol=1e-13)
         np.testing.assert_allclose(frame, group.local[1][:, None] * basis, atol=1e-13)
-
-
-COMPOSED = [
-    (*EDGE_GROUPS[:2], EDGE_GROUPS[-1]),
-    (EDGE_GROUPS[3],),
-    (EDGE_GROUPS[2], EDGE_GROUPS[0]),
-    EDGE_GROUPS[::-1],
-]
-
-
-@pytest.mark.parametrize("groups", COMPOSED, ids=lambda groups: "-".join(g.name for g in groups))
-def test_a_set_of_any_groups_has_their_columns_and_no_others(groups):
-    """Also where a set is as wide as another one, or narrower than a group of it."""
-    points, faces = bumpy_sphere()
-    level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
-
-    def columns(seen):
-        rule = PaperRule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
-        return edge_inputs(level, rule, level.topology.interior).features
-
-    every = FeatureSet("every", EDGE_GROUPS, (HALF_TURN,))
-    whole, of_group = columns(every), dict(zip(EDGE_GROUPS, every.starts, strict=True))
-    places = [of_group[g] + k for g in groups for k in range(len(g.features))]
-    made = columns(FeatureSet("composed", tuple(groups), (HALF_TURN,)))
-    np.testing.assert_array_equal(made, whole[:, places])
 
 
 def test_features_keep_their_limits():
