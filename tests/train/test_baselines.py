@@ -9,16 +9,13 @@ from pns_common import Mesh, loop
 from tests.support.meshes import bumpy_sphere, grid, manifolds, rotation, soups
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
 from train.baselines.controls import flat, full_push, n1, nc, q1
-from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
+from train.baselines.edge_rules import curvature_adaptive, normal_displacement
 from train.baselines.neural_subdivision import HalfFlapNets, neural_subdivision
 from train.baselines.pn_triangles import cubic_control_point, pn_triangles
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 from train.connectivity import connect
-from train.data.datasets import Dataset, Instance, ridge_training
 from train.data.primitives import box, globe, icosphere, torus
-from train.metrics.card import one_step_table
 from train.refining import refine
-from train.surfaces.implicit import SphereRidge
 
 BASELINES = {
     "butterfly": modified_butterfly(),
@@ -54,12 +51,6 @@ def test_baselines_commute_with_rigid_motion(name, mesh):
     moved = Mesh(mesh.vertices @ turn.T + shift, mesh.faces)
     here, there = (refine(each, BASELINES[name]).mesh.vertices for each in (mesh, moved))
     np.testing.assert_allclose(there, here @ turn.T + shift, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", sorted(set(BASELINES) - {"normal-displacement", *HALF_FLAPS}))
-def test_planar_input_stays_in_its_plane(name):
-    refined = refine(Mesh(*grid(6)), BASELINES[name], levels=3).mesh
-    np.testing.assert_allclose(refined.vertices[:, 2], 0, atol=1e-14)
 
 
 def butterfly(mesh):
@@ -132,22 +123,6 @@ def test_the_quadric_is_exact_on_height_quadratics_along_its_axis():
     np.testing.assert_allclose(
         placed[inner, 2], 0.3 * x * x - 0.2 * x * y + 0.1 * y * y + x, atol=1e-12
     )
-
-
-def test_the_fitted_scalar_reaches_a_sphere_and_is_better_than_its_neighbours():
-    mesh = icosphere(0)
-    edge = np.linalg.norm(mesh.vertices[mesh.faces[0, 0]] - mesh.vertices[mesh.faces[0, 1]])
-    data = Dataset("icosahedron", (Instance(SphereRidge(1.0, 0.0, 1.0, 0.0), mesh),))
-    # Loop's edge vertices all have one radius: its masks know the icosahedron's symmetry.
-    radius = np.linalg.norm(refine(mesh, loop()).mesh.vertices[12:], axis=1)
-    assert fit_scalar(data) == pytest.approx((1 - radius[0]) / edge)
-    few = Dataset("few", ridge_training().instances[:4])
-    scalar = fit_scalar(few)
-    sums = [
-        (one_step_table(normal_displacement(scalar + off), few)["distance"] ** 2).sum()
-        for off in (0, -0.01, 0.01)
-    ]
-    assert sums[0] < min(sums[1:])
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common import Mesh, MeshError
-from tests.support.meshes import bow_tie, bumpy_sphere, grid, icosphere, one_way_pair, three_pages
+from pns_common import MeshError
+from tests.support.meshes import bumpy_sphere, icosphere
 from train.data.dense_meshes import (
     is_manifold,
     largest_part,
@@ -45,23 +45,6 @@ def test_the_largest_part_is_taken(tmp_path):
     part = largest_part(read_mesh(write(tmp_path / "two.glb", small, SPHERE)))
     assert len(part.faces) == len(SPHERE[1])
     assert np.abs(part.vertices).max() < 2
-
-
-def test_parts_of_several_primitives_are_joined(tmp_path):
-    """Materials split a mesh; the halves' common border has the same positions."""
-    vertices, faces = SPHERE
-    upper = vertices[faces].mean(axis=1)[:, 2] > 0
-    path = write(tmp_path / "split.glb", (vertices, faces[upper]), (vertices, faces[~upper]))
-    assert len(largest_part(read_mesh(path)).faces) == len(faces)
-
-
-def test_manifolds_are_told_from_the_rest():
-    assert is_manifold(Mesh(*icosphere()))
-    assert is_manifold(Mesh(*grid()))
-    for shape in (bow_tie(), three_pages(), one_way_pair()):
-        assert not is_manifold(Mesh(*shape))
-    vertices, faces = icosphere()
-    assert not is_manifold(Mesh(np.concatenate([vertices, [[9, 9, 9]]]), faces))
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\3\4", b"no arrays"])

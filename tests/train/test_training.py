@@ -51,15 +51,6 @@ def test_fairness_pairs_are_the_interior_edges_that_share_a_face():
     assert set(sorted_pairs) == expected
 
 
-def test_fairness_is_zero_for_equal_normals_and_counts_only_its_pairs():
-    normals = unit_rows(0)
-    equal = normals[:1].expand(6, 3)
-    assert fairness_loss(equal, torch.tensor([[0, 5], [1, 2]])) == 0
-    pairs = torch.tensor([[0, 3]])
-    expected = (normals[0] - normals[3]).square().sum()
-    torch.testing.assert_close(fairness_loss(normals, pairs), expected)
-
-
 def test_each_weight_counts_its_own_term():
     distance, ratio = torch.tensor([0.1, -0.2]), torch.tensor([0.5, 1.0])
     normals, target = unit_rows(1, 2).float(), unit_rows(2, 2).float()
