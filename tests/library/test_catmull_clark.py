@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop
-from pns_common.carry.columns import level_topologies, refine_columns
+from pns_common.carry.columns import level_topologies
 from pns_common.mesh.quads import split_quads
 from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
@@ -313,18 +313,3 @@ def test_loop_refuses_polygons_and_says_what_takes_them():
         refine(Mesh(*SHAPES["cube"]), loop(), 1)
     with pytest.raises(MeshError, match="triangles"):
         level_topologies(SHAPES["cube"][1], 8, 1)
-
-
-def test_columns_and_matrix_follow_positions():
-    points, faces = SHAPES["mixed"]
-    points, creases = uneven(points), Creases(np.array([[0, 1], [1, 5]]), levels=2)
-    made = refine(Mesh(points, faces), catmull_clark(), 3, creases=creases)
-    topologies = level_topologies(faces, len(points), 3, creases, CATMULL_CLARK)
-    columns = np.hstack([points, points[:, :2]])
-    refined = refine_columns(columns, topologies, CATMULL_CLARK)
-    np.testing.assert_array_equal(refined[:, :3], made.mesh.vertices)
-    np.testing.assert_array_equal(refined[:, 3:], made.mesh.vertices[:, :2])
-    matrix = subdivision_matrix(made.topologies, CATMULL_CLARK)
-    product = np.zeros(made.mesh.vertices.shape)
-    np.add.at(product, matrix.rows, matrix.weights[:, None] * points[matrix.columns])
-    np.testing.assert_allclose(product, made.mesh.vertices, atol=1e-13)

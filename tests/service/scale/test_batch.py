@@ -378,6 +378,14 @@ def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
     assert "a row for each file" not in planned.stderr
 
 
+def test_a_line_of_no_mesh_costs_itself_alone(tmp_path):
+    library(tmp_path, ["a.obj"])
+    (tmp_path / "list.txt").write_text("a.obj\nb.fbx\n")
+    batch = batch_of(tmp_path, tmp_path / "list.txt")
+    assert refined(batch).counts == {"done": 1, "failed": 1}
+    assert "fbx" in rows(batch)["b.fbx"]["detail"]
+
+
 def test_a_report_replaces_no_manifest(tmp_path):
     library(tmp_path / "in", ["a.obj"])
     manifest = tmp_path / "list.jsonl"
