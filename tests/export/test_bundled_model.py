@@ -136,16 +136,6 @@ def test_card_holds_the_recipe_as_it_stands(name):
     assert as_json(checkpoint_card(checkpoint).training) == as_json(training)
 
 
-def test_export_command_writes_the_same_bytes_twice(tmp_path):
-    path = tmp_path / "c.safetensors"
-    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
-    for name in ("one.onnx", "two.onnx"):
-        outcome = export_command(path, tmp_path / name)
-        assert outcome.exit_code == 0
-        assert "parity" in outcome.output
-    assert (tmp_path / "one.onnx").read_bytes() == (tmp_path / "two.onnx").read_bytes()
-
-
 def test_bundled_files_are_replaced_only_where_that_is_asked(tmp_path, monkeypatch):
     """A copy of the folder stands for the bundled one."""
     monkeypatch.setattr(export.run, "MODELS", tmp_path)
@@ -171,14 +161,6 @@ def test_export_command_refuses_what_is_no_checkpoint(tmp_path):
     assert outcome.exit_code == 1
     assert "expected safetensors" in outcome.output
     assert not (tmp_path / "m.onnx").exists()
-
-
-def test_export_command_refuses_a_folder_to_write_to(tmp_path):
-    path = tmp_path / "c.safetensors"
-    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
-    outcome = export_command(path, tmp_path)
-    assert outcome.exit_code == 1
-    assert "expected a file" in outcome.output
 
 
 def test_export_command_names_files_as_they_are_called(tmp_path):

@@ -288,6 +288,7 @@ def test_totals_are_taken_over_meshes():
         for key in ("vertices", "faces", "degenerate_frames", "flipped_faces"):
             assert total[key] == sum(part[key] for part in parts)
         assert total["gate"]["max"] == max(part["gate"]["max"] for part in parts)
+        assert total["normal_jump_max"] == max(part["normal_jump_max"] for part in parts)
         weights = [part["edges"]["interior"] for part in parts]
         means = [part["proximity_ratio"]["mean"] for part in parts]
         assert total["proximity_ratio"]["mean"] == pytest.approx(np.average(means, weights=weights))

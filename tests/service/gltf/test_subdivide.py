@@ -96,6 +96,9 @@ def test_useless_normals_and_tangents_become_unit_vectors():
     for name in ("NORMAL", "TANGENT"):
         lengths = np.linalg.norm(attributes[name][:, :3], axis=1)
         np.testing.assert_allclose(lengths, 1, atol=1e-6)
+    del shape["NORMAL"]
+    _, attributes = files.primitive_of(subdivide([shape], normals="keep").glb)
+    assert set(map(tuple, attributes["TANGENT"].tolist())) == {(0, 0, 1, 1)}
 
 
 @pytest.mark.parametrize(("dtype", "full"), [(np.uint8, 255), (np.uint16, 65535)])

@@ -6,8 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from service.errors import GltfError
-from service.gltf.subdivide import subdivide_gltf
-from service.options import Limits, Options
+from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files, validator
 from tests.support.gltf.shapes import box, octahedron
 
@@ -23,11 +22,6 @@ STORAGE = {
     "_ID": [("u2", False), ("u1", False), ("i1", False), ("f4", False)],
 }
 WIDTHS = {"POSITION": 3, "NORMAL": 3, "TANGENT": 4, "TEXCOORD_0": 2, "_ID": 1}
-
-
-def refine(data, levels=1):
-    options = Options(levels=levels, scheme="loop")
-    return subdivide_gltf(data, "glb", options, None, Limits())
 
 
 def meaning(values, normalized):

@@ -5,14 +5,9 @@ import pytest
 
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
+from tests.service.gltf.subdivided import subdivide
 from tests.support.gltf import files, validator
 from tests.support.gltf.shapes import box, octahedron
-from tests.support.networks import random_model
-
-
-def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", "levels": 1, **options})
-    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 
 def deltas(seed, count=6, size=0.3):

@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError
-from service.gltf.subdivide import subdivide_gltf
-from service.options import Limits, Options
+from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
 
 FOUND = "found, and left: "
-
-
-def refine(data):
-    return subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits())
 
 
 def found(made):
