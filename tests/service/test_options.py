@@ -52,6 +52,11 @@ def test_a_value_outside_its_range_is_refused_by_name(name, value):
     assert refusal.value.status == 422
 
 
+def test_a_wrong_choice_is_answered_with_all_there_are():
+    with pytest.raises(InvalidParameter, match="border must be one of smooth, corners, fixed"):
+        Options(border="round")
+
+
 def test_a_wrong_crease_is_answered_with_an_example():
     with pytest.raises(InvalidParameter, match="as in 'angle:40'"):
         Options(crease="on")

@@ -151,13 +151,6 @@ def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compre
     assert f"{16 * FACES:,} triangles" in done.err
 
 
-def test_a_misspelt_setting_ends_it(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PNS_BODDY", "1MiB")
-    code, out, err = pns("serve")
-    assert (code, out) == (2, "")
-    assert err == "pns: there is no setting PNS_BODDY; is it PNS_BODY?\n"
-
-
 def test_a_file_of_keys_that_cannot_be_used_ends_it(
     pns: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,6 +164,7 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
+        ({"PNS_BODDY": "1MiB"}, "there is no setting PNS_BODDY; is it PNS_BODY?\n"),
         ({"PNS_MODEL": "nope"}, "PNS_MODEL (or --model): model nope: "),
         ({"PNS_PROVIDERS": "Foo"}, "PNS_PROVIDERS: providers = ('Foo',): "),
         ({"PNS_IGNORE_UNKNOWN": "maybe"}, "PNS_IGNORE_UNKNOWN: "),
