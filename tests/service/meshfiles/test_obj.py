@@ -70,32 +70,6 @@ def test_faces_stay_in_their_order_whatever_divides_them(corner):
     assert triangles(text) == faces
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (POSITIONS + "f 0 1 2\n", "line 7 of the OBJ file: a face names vertex 0"),
-        (POSITIONS + "\nf 1 2 7\n", "line 8 .* vertex 7, and there are 6"),
-        ("v 0 0 0\nf 1 -2 1\n" + POSITIONS, "line 2 .* vertex -2, and there are 1"),
-        (POSITIONS + "f 1 2 \\\n x\n", "line 7 .* 'x' is no number"),
-        (POSITIONS + "f 1 2 \\\n x\\", "line 7 .* 'x' is no number"),
-        (POSITIONS.replace("2 2 1", "2 2") + "f 1 2 3\n", "line 5 .* a vertex has 2 coordinates"),
-        (
-            POSITIONS.replace("2 2 1", "2,5 2,5 1") + "f 1 2 5\n",
-            "line 5 .* '2,5' is no number",
-        ),
-        (POSITIONS + "f 1 1_0 2\n", "line 7 .* '1_0' is no number"),
-        (POSITIONS + "vt 0 0\nf 1/1 2/1_0 3/1\n", "line 8 .* '2/1_0' is no corner of a face"),
-        (POSITIONS.replace("2 2 1", "2_2 2 1") + "f 1 2 5\n", "line 5 .* is no number"),
-        (POSITIONS + "f 1.0 2 3\n", "line 7 .* '1.0' is no number"),
-        ((POSITIONS + "f 1 2 7\n").replace("\n", "\r"), "line 7 .* vertex 7, and there are 6"),
-        (POSITIONS + "f 1 2\nf 2 3\n", "the OBJ file has no faces"),
-    ],
-)
-def test_what_is_wrong_is_named_with_its_line(text, words):
-    with pytest.raises(UnreadableError, match=words):
-        formats.read(text.encode(), "obj")
-
-
 def test_a_name_may_have_a_sign_that_begins_a_comment_elsewhere():
     names = ["Wood#1", "Material #2", "red # a comment", "#4", "two words"]
     text = POSITIONS + "".join(f"usemtl {name}\nf 1 2 3\n" for name in names)

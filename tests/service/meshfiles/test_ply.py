@@ -90,26 +90,6 @@ def test_a_file_that_was_cut_off_says_where(order: str) -> None:
             read(ply(order)[: -cut - (order == "")], "ply")
 
 
-@pytest.mark.parametrize(
-    ("data", "says"),
-    [
-        (ply("<").replace(b"face 3", b"face 9" + b"9" * 17), "ends after"),
-        (ply("<").replace(b"uint vertex", b"quad vertex"), "line 9 of the PLY header"),
-        (ply("<")[:100], "its header has no end"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1,5 2 3"), r"line 16 of the PLY file: '1,5'"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "vertex_indices .* 1.5, no whole number"),
-        (ply("").replace(b"4 0 1 2 3", b"4.5 0 1 2 3"), "ends after"),
-        # No comment, which would hide the numbers behind it.
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1 #2 3"), r"line 16 of the PLY file: '#2'"),
-        (ply("").replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
-        (b"OFF\n", "this is not a PLY"),
-    ],
-)
-def test_what_is_wrong_is_said_with_its_place(data: bytes, says: str) -> None:
-    with pytest.raises(UnreadableError, match=says):
-        read(data, "ply")
-
-
 TEXTURED = b"""ply
 format ascii 1.0
 comment TextureFile %b
