@@ -194,22 +194,6 @@ def test_own_meshes_are_named_with_theorem_4_or_why_they_were_skipped(tmp_path):
     assert ring["proximity"] == pytest.approx(apart / (scheme.budget * longest**2), rel=1e-6)
 
 
-@pytest.mark.parametrize("text", ["v 0 0 0\n", "v 0 0\nf 1 1 1\n", "v 0 0 0\nf 1 2 9\n"])
-def test_a_file_that_is_no_mesh_is_named(tmp_path, text):
-    (tmp_path / "wrong.obj").write_text(text)
-    arguments = ["certify", "--meshes", str(tmp_path)]
-    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
-    assert outcome.exit_code == 2
-    assert "wrong.obj: " in outcome.output
-
-
-def test_an_unknown_theorem_is_an_error_of_use():
-    arguments = ["certify", "paper", "--only", "T9"]
-    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
-    assert outcome.exit_code == 2
-    assert "T8" in outcome.output
-
-
 def test_the_command_names_a_file_as_it_is_called():
     """Square brackets are markup to what prints."""
     outcome = CliRunner().invoke(train.run.app, ["certify", "a[/b].onnx"], catch_exceptions=False)
@@ -218,14 +202,22 @@ def test_the_command_names_a_file_as_it_is_called():
     assert "nan" not in outcome.output
 
 
-def test_a_verdict_into_a_folder_is_refused_before_the_work(tmp_path):
-    arguments = ["certify", "none.onnx", "--json", str(tmp_path)]
-    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
+@pytest.mark.parametrize(
+    ("arguments", "mesh", "says"),
+    [
+        ("paper --only T9", None, "T8"),
+        ("none.onnx --json .", None, "directory"),
+        ("--meshes .", None, "no .obj"),
+        ("--meshes .", "v 0 0 0\n", "wrong.obj: "),
+        ("--meshes .", "v 0 0\nf 1 1 1\n", "wrong.obj: "),
+        ("--meshes .", "v 0 0 0\nf 1 2 9\n", "wrong.obj: "),
+    ],
+)
+def test_what_cannot_be_certified_is_an_error_of_use(tmp_path, monkeypatch, arguments, mesh, says):
+    monkeypatch.chdir(tmp_path)
+    if mesh is not None:
+        (tmp_path / "wrong.obj").write_text(mesh)
+    command = ["certify", *arguments.split()]
+    outcome = CliRunner().invoke(train.run.app, command, catch_exceptions=False)
     assert outcome.exit_code == 2
-
-
-def test_a_folder_without_meshes_is_an_error_of_use(tmp_path):
-    arguments = ["certify", "--meshes", str(tmp_path)]
-    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
-    assert outcome.exit_code == 2
-    assert "no .obj" in outcome.output
+    assert says in outcome.output
