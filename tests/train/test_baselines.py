@@ -9,13 +9,16 @@ from pns_common import Mesh, loop
 from tests.support.meshes import bumpy_sphere, grid, manifolds, rotation, soups
 from train.baselines.butterfly import butterfly_edge_vertices, modified_butterfly, star_weights
 from train.baselines.controls import flat, full_push, n1, nc, q1
-from train.baselines.edge_rules import curvature_adaptive, normal_displacement
+from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
 from train.baselines.neural_subdivision import HalfFlapNets, neural_subdivision
 from train.baselines.pn_triangles import cubic_control_point, pn_triangles
 from train.baselines.quadric import quadric_edge_points, quadric_fit
 from train.connectivity import connect
+from train.data.datasets import Dataset, Instance, ridge_training
 from train.data.primitives import box, globe, icosphere, torus
+from train.metrics.card import one_step_table
 from train.refining import refine
+from train.surfaces.implicit import SphereRidge
 
 BASELINES = {
     "butterfly": modified_butterfly(),
@@ -161,3 +164,27 @@ def test_nc_is_loop_on_a_plane_and_stays_within_its_budget():
     away = np.linalg.norm(made - base, axis=1)[len(mesh.vertices) :]
     assert (away <= 0.8 / 50 * square * (1 + 1e-12)).all()
     assert away.max() > 0.5 * 0.8 / 50 * square.max()
+
+
+def test_butterfly_reproduces_cubics_along_a_boundary():
+    placed, middle, level = butterfly(Mesh(*grid(9, lambda x, y: y**3 - y)))
+    # At a corner of the grid the curve turns, so the last edges are left out.
+    side = level.boundary.numpy() & (np.abs(middle[:, 0]) == 1) & (np.abs(middle[:, 1]) < 0.8)
+    assert side.sum() == 12
+    np.testing.assert_allclose(placed[side, 2], middle[side, 1] ** 3 - middle[side, 1], atol=1e-14)
+
+
+def test_the_fitted_scalar_reaches_a_sphere_and_is_better_than_its_neighbours():
+    mesh = icosphere(0)
+    edge = np.linalg.norm(mesh.vertices[mesh.faces[0, 0]] - mesh.vertices[mesh.faces[0, 1]])
+    data = Dataset("icosahedron", (Instance(SphereRidge(1.0, 0.0, 1.0, 0.0), mesh),))
+    # Loop's edge vertices all have one radius: its masks know the icosahedron's symmetry.
+    radius = np.linalg.norm(refine(mesh, loop()).mesh.vertices[12:], axis=1)
+    assert fit_scalar(data) == pytest.approx((1 - radius[0]) / edge)
+    few = Dataset("few", ridge_training().instances[:4])
+    scalar = fit_scalar(few)
+    sums = [
+        (one_step_table(normal_displacement(scalar + off), few)["distance"] ** 2).sum()
+        for off in (0, -0.01, 0.01)
+    ]
+    assert sums[0] < min(sums[1:])

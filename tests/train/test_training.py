@@ -125,3 +125,18 @@ def test_training_lowers_the_loss_and_reports_every_step():
     assert [done for done, _ in reports] == list(range(1, 21))
     assert tuple(loss for _, loss in reports) == trained.losses
     assert trained.losses[-1] < 0.8 * trained.losses[0]
+
+
+def test_normal_loss_is_one_minus_the_cosine():
+    angle = torch.tensor([0.0, 0.3, np.pi], dtype=torch.float64)
+    zero = torch.zeros(3, dtype=torch.float64)
+    normals = torch.stack([angle.sin(), zero, angle.cos()], dim=-1)
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).expand(3, 3)
+    expected = (1 - angle.cos()).mean()
+    torch.testing.assert_close(normal_loss(normals, up), expected, rtol=0, atol=1e-15)
+
+
+def test_distance_and_proximity_are_mean_squares():
+    values = torch.tensor([3.0, -4.0])
+    assert distance_loss(values) == 12.5
+    assert proximity_loss(values) == 12.5
