@@ -1,4 +1,4 @@
-"""What is wrong with a mesh file is said with its place, and in its own words."""
+"""Refusals of mesh files name the place, in the words of the file."""
 
 from __future__ import annotations
 
