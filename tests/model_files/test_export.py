@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-import onnxruntime
 import pytest
 import torch
 from typer.testing import CliRunner
@@ -71,16 +70,6 @@ def test_the_same_networks_give_the_same_bytes_and_nothing_of_this_machine(made)
     assert {node.op_type for node in proto.graph.node} <= ALLOWED_OPERATORS
     assert not proto.producer_version + proto.doc_string
     assert not any(node.doc_string for node in proto.graph.node)
-
-
-@pytest.mark.parametrize(("activation", "fused"), [("gelu", "Gelu"), ("silu", "QuickGelu")])
-def test_onnxruntime_computes_an_activation_in_one_operator(tmp_path, activation, fused):
-    options = onnxruntime.SessionOptions()
-    options.optimized_model_filepath = str(tmp_path / "optimised.onnx")
-    data = model_bytes(dense(activation), CARD)
-    onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-    operators = [node.op_type for node in onnx.load(tmp_path / "optimised.onnx").graph.node]
-    assert operators.count(fused) == 2
 
 
 @pytest.mark.parametrize("version", [2, 4])
