@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,8 +42,15 @@ from .pose import joint_matrices, posed
 
 TRANSFORM, VISIBILITY = "KHR_texture_transform", "KHR_node_visibility"
 LOST = ("textures", "images", "animations", "skins", "cameras", "extensions")
+# Where a node stands that does not say.
+UNMOVED = {
+    "translation": np.zeros(3),
+    "rotation": np.array([0.0, 0.0, 0.0, 1.0]),
+    "scale": np.ones(3),
+    "matrix": np.eye(4).reshape(-1),
+}
 # What placing a copy costs beside its faces, in faces; each joint of a skin costs one more.
-COPY_COST = 50
+COPY_COST = 100
 _COPY_ATTRIBUTES = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
 
 
@@ -106,9 +114,7 @@ def flatten(
     return mesh_file, changes
 
 
-def check_copies(
-    upload: Upload, faces: Mapping[int, int], limits: Limits
-) -> list[tuple[int, int]]:
+def check_copies(upload: Upload, faces: Mapping[int, int], limits: Limits) -> list[tuple[int, int]]:
     """Check what it costs to place the copies of a scene's meshes, whose `faces` are known.
 
     Returns the nodes that show one, each with its mesh.
@@ -241,9 +247,9 @@ def _scene_nodes(tree: dict[str, Any]) -> tuple[dict[int, int | None], set[int]]
 def _world_matrices(
     nodes: list[dict[str, Any]], parents: dict[int, int | None]
 ) -> dict[int, Float[np.ndarray, "4 4"]]:
-    """Return where each node stands; parents come before their children."""
+    """Return where each node stands; parents come before their children. Raises GltfError."""
     worlds: dict[int, Float[np.ndarray, "4 4"]] = {}
-    local = _local_matrices([nodes[number] for number in parents])
+    local = _local_matrices(nodes, parents.keys())
     for (number, parent), matrix in zip(parents.items(), local, strict=True):
         worlds[number] = (np.eye(4) if parent is None else worlds[parent]) @ matrix
     return worlds
@@ -259,17 +265,29 @@ def _children(nodes: list[dict[str, Any]]) -> list[int]:
     return [child for node in nodes for child in node.get("children", [])]
 
 
-def _local_matrices(nodes: list[dict[str, Any]]) -> Float[np.ndarray, "N 4 4"]:
-    given = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
-    parts = (
-        np.array([node.get(name, usual) for node in nodes], dtype=np.float64)
-        for name, usual in given
-    )
-    matrices = _placements(*parts)
-    for matrix, node in zip(matrices, nodes, strict=True):
-        if "matrix" in node:
-            matrix[:] = np.reshape(node["matrix"], (4, 4)).T
+def _local_matrices(
+    nodes: list[dict[str, Any]], numbers: Iterable[int]
+) -> Float[np.ndarray, "N 4 4"]:
+    columns = {
+        name: np.array([_numbers(nodes, number, name, usual) for number in numbers])
+        for name, usual in UNMOVED.items()
+    }
+    matrices = _placements(*(columns[name] for name in ("translation", "rotation", "scale")))
+    given = [("matrix" in nodes[number]) for number in numbers]
+    matrices[given] = columns["matrix"][given].reshape(-1, 4, 4).transpose(0, 2, 1)
     return matrices
+
+
+def _numbers(
+    nodes: list[dict[str, Any]], number: int, name: str, usual: Float[np.ndarray, " K"]
+) -> Float[np.ndarray, " K"]:
+    if name not in nodes[number]:
+        return usual
+    with suppress(TypeError, ValueError, OverflowError):
+        values = np.array(nodes[number][name], dtype=np.float64)
+        if values.shape == usual.shape and np.isfinite(values).all():
+            return values
+    raise GltfError(f"{name} must be {len(usual)} numbers", pointer=f"/nodes/{number}/{name}")
 
 
 def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:

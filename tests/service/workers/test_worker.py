@@ -59,19 +59,3 @@ def test_a_refusal_holds_nothing_of_its_job(kind: type[Exception]) -> None:
         worker.call(job)
     assert left[0]() is None
     assert caught.value.__cause__ is None
-
-
-@pytest.mark.parametrize(("given", "then"), [("0\n", "500"), ("875\n", "1000"), ("-998\n", "-498")])
-def test_a_worker_is_preferred_to_its_server_and_never_less_than_it_was(given, then, tmp_path):
-    """A pod of a cluster begins where it must not go below: at 875, or wherever its memory says."""
-    preference = tmp_path / "oom_score_adj"
-    preference.write_text(given)
-    worker.prefer(preference)
-    assert preference.read_text() == then
-
-
-def test_a_worker_starts_where_no_preference_can_be_had(tmp_path):
-    """Nor where there is none at all."""
-    tmp_path.joinpath("refused").mkdir()
-    worker.prefer(tmp_path / "refused")
-    worker.prefer(tmp_path / "missing")
