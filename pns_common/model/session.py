@@ -242,6 +242,9 @@ def _open_session(data: bytes, name: str, providers: Sequence[str]) -> Any:
     options = runtime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
+    # What one run took is given back: its arena would keep the most that any has taken.
+    options.enable_cpu_mem_arena = False
+    options.enable_mem_pattern = False
     options.log_severity_level = 4
     try:
         return runtime.InferenceSession(data, options, providers=list(providers))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from service.course import Course
 from service.errors import GltfError, LimitError, UnrefinableError
 from service.meshfiles.convert import converted
 from service.meshfiles.formats import read, write
@@ -54,15 +55,40 @@ def test_every_copy_stands_where_its_attributes_put_it():
     np.testing.assert_allclose([second.min(axis=0), second.max(axis=0)], expected, atol=1e-5)
 
 
-def test_copies_without_end_are_refused_before_they_are_made():
-    with pytest.raises(LimitError, match="with all copies"):
-        flatten(copied(TRANSLATION=np.zeros((20, 3))), "stl", Limits(max_faces=100))
+@pytest.mark.parametrize("copies", [60_000, 4000])
+def test_copies_that_cost_too_much_are_refused_before_anything_is_refined(copies):
+    """Each costs its faces, eight or 512 of them, and what placing one takes."""
+    data, stages = copied(TRANSLATION=np.zeros((copies, 3))), list[str]()
+    options = Options(scheme="loop", levels=1 if copies > 10_000 else 4)
+    course = Course(begins=stages.append)
+    with pytest.raises(LimitError, match="with all copies") as refused:
+        converted(data, "glb", "stl", options, None, Limits(), course)
+    assert (refused.value.limit, refused.value.status, stages) == ("faces", 413, ["read"])
 
 
 def test_copies_that_their_accessors_do_not_agree_on_are_refused():
     data = copied(TRANSLATION=np.zeros((2, 3)), SCALE=np.ones((3, 3)))
     with pytest.raises(GltfError, match="as many values"):
         flatten(data, "stl", Limits())
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("translation", [1, 2]),
+        ("rotation", ["a", 0, 0, 1]),
+        ("scale", [[1], [1], [1]]),
+        ("scale", {}),
+        ("matrix", [1.0] * 15),
+        ("matrix", "data:,"),
+    ],
+)
+def test_a_node_that_stands_nowhere_is_refused(name, values):
+    tree, binary = files.document([octahedron()])
+    tree["nodes"][0][name] = values
+    with pytest.raises(GltfError, match=f"{name} must be") as refused:
+        converted(files.pack(tree, binary), "glb", "obj", Options(scheme="loop"), None, Limits())
+    assert refused.value.pointer == f"/nodes/0/{name}"
 
 
 def test_texture_coordinates_are_written_as_the_material_transforms_them():
