@@ -1,6 +1,6 @@
 /**
- * How long from a drop to the picture, how many frames a second, and how soon a cancelled job's worker
- * is free: `node measure.mjs`. Prints figures and judges none: they are the machine's.
+ * How long from a drop to the picture, and how many frames a second: `node measure.mjs`. Prints
+ * figures and judges none: they are the machine's.
  */
 
 import { choose, launch, open, settled } from "./test/support/browser.mjs";
@@ -44,32 +44,8 @@ for (const [across, levels] of [
   }
   console.log(`${name}: drop to picture ${spread(drops)} s, ${spread(frames)} frames a second`);
 }
-const waits = [];
-for (let run = 0; run < RUNS; run++) {
-  const { page, context } = await open(browser, `${server.address}/#levels=5`, { viewport: VIEWPORT });
-  await choose(page, { name: "torus.obj", mimeType: "", buffer: torus(50, 20) });
-  // Inside a level: the worker is at its longest piece of work.
-  await page.waitForFunction(() => document.querySelector("#work-bar").value > 0.2);
-  waits.push(await page.evaluate(cancelling));
-  await context.close();
-}
-console.log(`From the click on Cancel to a free worker: ${spread(waits.map((ms) => ms / 1000), 2)} s`);
 await browser.close();
 await server.close();
-
-/** In the page: cancel, and the milliseconds until the service has answered that the job is gone. */
-function cancelling() {
-  const { fetch } = window;
-  return new Promise((resolve) => {
-    const began = performance.now();
-    window.fetch = async (...asked) => {
-      const answer = await fetch(...asked);
-      if (asked[1]?.method === "DELETE") resolve(performance.now() - began);
-      return answer;
-    };
-    document.querySelector("#cancel").click();
-  });
-}
 
 /** An OBJ of 2 × around × across triangles. */
 function torus(around, across) {
@@ -112,8 +88,8 @@ async function turning(seconds) {
   return (drawn() - first) / ((performance.now() - began) / 1000);
 }
 
-function spread(values, digits = 1) {
+function spread(values) {
   const sorted = [...values].sort((a, b) => a - b);
   const [low, middle, high] = [sorted[0], sorted[sorted.length >> 1], sorted.at(-1)];
-  return `${middle.toFixed(digits)} (${low.toFixed(digits)} to ${high.toFixed(digits)})`;
+  return `${middle.toFixed(1)} (${low.toFixed(1)} to ${high.toFixed(1)})`;
 }

@@ -163,14 +163,21 @@ def refine_scene(
     model: Model | None,
     limits: Limits,
     course: Course,
-    siblings: SiblingFiles = ALONE,
+    siblings: SiblingFiles,
+    check: Callable[[Upload], object],
 ) -> RefinedScene:
     """Refine every triangle mesh of a glTF file for writers of other formats.
 
-    Arguments and errors are those of `subdivide_gltf`.
+    `check` is called with what was read, before anything is refined; other arguments and errors
+    are those of `subdivide_gltf`.
     """
+
+    def start(upload: Upload) -> Gathered:
+        check(upload)
+        return Gathered()
+
     asked = options, model, limits, course, siblings
-    made = _refined(data, media, *asked, lambda _: Gathered(), traced=False)
+    made = _refined(data, media, *asked, start, traced=False)
     report = made.report(options.levels)
     return RefinedScene(made.upload, made.into.meshes, report, made.faces_in)
 

@@ -158,9 +158,10 @@ class StreamAnswer(_Answer):
             try:
                 work.result()
             except (ServiceError, JobFaultError) as error:
+                document = problems.of_failure(error)
                 # For the journal.
-                scope["state"]["problem"] = getattr(error, "code", "internal-error")
-                yield self._head("problem", problems.MEDIA_TYPE) + problems.of_job(error) + end
+                scope["state"]["problem"] = document.code
+                yield self._head("problem", problems.MEDIA_TYPE) + bytes(document.body) + end
             else:
                 timing = f"Server-Timing: {server_timing(job.seconds)}"
                 with self._taking():

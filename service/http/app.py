@@ -8,10 +8,10 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fastapi import FastAPI
-from fastapi.routing import APIRoute
+from fastapi.telemetry import TelemetryConfig
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -27,11 +27,9 @@ from .access.origins import Origins, is_loopback
 from .jobs import Service
 from .watch.journal import Journal
 from .watch.metrics import Metrics
-from .watch.tracing import record, tracer_from_environment
+from .watch.tracing import provider_from_environment
 
 if TYPE_CHECKING:
-    from opentelemetry.trace import Tracer
-
     from pns_common.model.session import Model
 
 log = logging.getLogger("pns.service")
@@ -72,7 +70,7 @@ def create_app(
     metrics.gauge("pns_requests_held", "Requests under way", lambda: service.places.taken.total())
     metrics.gauge("pns_jobs_waiting", "Jobs that wait", lambda: workers.waiting)
     metrics.gauge("pns_jobs_running", "Jobs that run or end", lambda: workers.held.total())
-    tracer = tracer_from_environment()
+    tracers = provider_from_environment()
     keys = None if settings.keys_file is None else read_keys(settings.keys_file)
 
     @asynccontextmanager
@@ -106,23 +104,23 @@ def create_app(
         redirect_slashes=False,
         docs_url=None,
         redoc_url=None,
-        # Its spans would hold paths and queries; ours do not.
-        telemetry={"tracing": False, "metrics": False, "logs": False},
+        telemetry=TelemetryConfig(
+            tracing=tracers is not None,
+            tracer_provider=tracers,
+            metrics=False,
+            logs=False,
+            operation_spans=False,
+        ),
         generate_unique_id_function=openapi.operation_id,
     )
     # Whoever names a route puts this before it; requests come without it.
     app.root_path = settings.prefix
-    app.layers = lambda routes: around(routes, settings, metrics, keys, tracer)
+    app.layers = lambda routes: around(routes, settings, metrics, keys)
     app.state.metrics = metrics
     app.state.service = service
     problems.install(app)
     routers = [routes.router(service), pages.router(settings.prefix)]
     for router in routers:
-        for route in [*router.routes]:
-            if isinstance(route, APIRoute) and route.methods == {"GET"}:
-                # Uvicorn sends the head alone.
-                more: dict[str, Any] = {"methods": ["HEAD"], "include_in_schema": False}
-                router.add_api_route(route.path, route.endpoint, **more)
         app.include_router(router)
     # For the journal: what a layer refuses reaches none of them.
     app.state.routes = [route for router in routers for route in router.routes]
@@ -135,11 +133,10 @@ def around(
     settings: Settings,
     metrics: Metrics,
     keys: list[Entry] | None,
-    tracer: Tracer | None = None,
 ) -> ASGIApp:
     """Lay around the routes everything that is done for every request.
 
-    `keys` None: it is open to everybody; `tracer` None: nothing is traced.
+    `keys` None: it is open to everybody.
     """
     app = routes
     if keys is not None:
@@ -153,8 +150,7 @@ def around(
             allow_headers=TAKEN,
             expose_headers=EXPOSED,
         )
-    spans = [] if tracer is None else [partial(record, tracer)]
-    app = Journal(app, metrics.request, *spans)
+    app = Journal(app, metrics.request)
 
     async def requests(scope: Scope, receive: Receive, send: Send) -> None:
         await (app if scope["type"] == "http" else routes)(scope, receive, send)

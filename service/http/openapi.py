@@ -212,9 +212,6 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
     for operations in document["paths"].values():
         for method, operation in operations.items():
             responses = operation["responses"]
-            # FastAPI's own errors are never sent: ours are with the routes.
-            if responses.get("422", {}).get("content", {}).get("application/json"):
-                del responses["422"]
             if OPEN_TAG not in operation.get("tags", ()):
                 also = {} if method == "get" else ASKED_FOR_WORK
                 for status, text in (EVERYWHERE | also).items():
@@ -226,8 +223,6 @@ def _described(document: dict[str, Any]) -> dict[str, Any]:
             for status, answer in responses.items():
                 own = answer.get("headers", {})
                 answer["headers"] = own | HEADERS.get(status, {}) | _REQUEST_ID
-    for name in ("HTTPValidationError", "ValidationError"):
-        schemas.pop(name, None)
     components["securitySchemes"] = {
         "key": {
             "type": "http",

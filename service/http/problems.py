@@ -14,7 +14,6 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
-from starlette.routing import Match
 from starlette.types import Receive, Scope, Send
 
 from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
@@ -54,7 +53,7 @@ def problem(
     *,
     headers: dict[str, str] | None = None,
     **members: Any,
-) -> JSONResponse:
+) -> ProblemResponse:
     """Return one problem document; members that are None are left out."""
     body = {
         "type": f"urn:pns:problem:{code}",
@@ -85,7 +84,7 @@ class ProblemResponse(JSONResponse):
         await super().__call__(scope, receive, send)
 
 
-def of_service_error(error: ServiceError) -> JSONResponse:
+def of_service_error(error: ServiceError) -> ProblemResponse:
     """Return the document of an error that the service foresees."""
     members: dict[str, Any] = {"pointer": error.pointer}
     headers: dict[str, str] = {}
@@ -101,17 +100,17 @@ def of_service_error(error: ServiceError) -> JSONResponse:
     return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
 
 
-def of_job(error: ServiceError | JobFaultError) -> bytes:
-    """Return the document of a job that failed, logged as it would be outside of a stream."""
+def of_failure(error: ServiceError | JobFaultError) -> ProblemResponse:
+    """Return the document of a request or job that failed, and log what is no client's fault."""
     if isinstance(error, JobFaultError):
         log.error("a job failed in its worker:\n%s", error)
-        return bytes(internal_error().body)
+        return internal_error()
     if error.status >= 500:
         log.warning("%s: %s", error.code, error)
-    return bytes(of_service_error(error).body)
+    return of_service_error(error)
 
 
-def _of_validation_error(error: RequestValidationError) -> JSONResponse:
+def _of_validation_error(error: RequestValidationError) -> ProblemResponse:
     first = error.errors()[0]
     name = next((str(part) for part in first["loc"][1:]), "")
     text = first["msg"]
@@ -121,32 +120,18 @@ def _of_validation_error(error: RequestValidationError) -> JSONResponse:
     return of_service_error(InvalidParameter(name, f"{name}: {text}"))
 
 
-def _of_http_exception(request: Request, error: HTTPException) -> JSONResponse:
+def _of_http_exception(error: HTTPException) -> ProblemResponse:
     title = HTTPStatus(error.status_code).phrase
     code = title.lower().replace(" ", "-")
     headers, detail = dict(error.headers or {}), str(error.detail)
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(_allowed(request))
         detail = f"this path takes {headers['Allow']}"
     elif detail == HTTPStatus.NOT_FOUND.phrase:
         detail = "there is nothing at this path; /docs shows what there is"
     return problem(error.status_code, code, title, detail, headers=headers)
 
 
-def _allowed(request: Request) -> list[str]:
-    """Return the methods of all routes that share a path: the error knows those of one."""
-    allowed = [
-        method
-        for method in ("GET", "POST")
-        if any(
-            route.matches({**request.scope, "method": method})[0] is Match.FULL
-            for route in request.app.routes
-        )
-    ]
-    return ["HEAD", *allowed] if "GET" in allowed else allowed
-
-
-def internal_error() -> JSONResponse:
+def internal_error() -> ProblemResponse:
     """Return the document of a fault of ours: plain, because its details belong in the log."""
     return problem(500, "internal-error", "Internal error", "The service failed; it is logged.")
 
@@ -154,24 +139,18 @@ def internal_error() -> JSONResponse:
 def install(app: FastAPI) -> None:
     """Make every error of `app` a problem document."""
 
+    @app.exception_handler(JobFaultError)
     @app.exception_handler(ServiceError)
-    async def service_error(request: Request, error: ServiceError) -> JSONResponse:
-        if error.status >= 500:
-            log.warning("%s: %s", error.code, error)
-        return of_service_error(error)
+    async def failure(request: Request, error: ServiceError | JobFaultError) -> ProblemResponse:
+        return of_failure(error)
 
     @app.exception_handler(RequestValidationError)
-    async def validation_error(request: Request, error: RequestValidationError) -> JSONResponse:
+    async def validation_error(request: Request, error: RequestValidationError) -> ProblemResponse:
         return _of_validation_error(error)
 
     @app.exception_handler(HTTPException)
-    async def http_exception(request: Request, error: HTTPException) -> JSONResponse:
-        return _of_http_exception(request, error)
-
-    @app.exception_handler(JobFaultError)
-    async def job_fault(request: Request, error: JobFaultError) -> JSONResponse:
-        log.error("a job failed in its worker:\n%s", error)
-        return internal_error()
+    async def http_exception(request: Request, error: HTTPException) -> ProblemResponse:
+        return _of_http_exception(error)
 
     @app.exception_handler(ClientDisconnect)
     async def client_disconnect(request: Request, error: ClientDisconnect) -> Response:
@@ -180,5 +159,5 @@ def install(app: FastAPI) -> None:
 
     # Starlette answers with this and raises the error again, so that the server logs it.
     @app.exception_handler(Exception)
-    async def fault(request: Request, error: Exception) -> JSONResponse:
+    async def fault(request: Request, error: Exception) -> ProblemResponse:
         return internal_error()

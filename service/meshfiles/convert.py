@@ -26,13 +26,13 @@ from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, Opened, SiblingFiles, folder_of
 from ..course import Course
 from ..errors import InvalidParameter, ServiceError, printable
-from ..gltf.read.upload import Media, read_upload
+from ..gltf.read.upload import Media, Upload, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, refine_scene, subdivide_gltf
 from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import MAX_LEVELS, Limits, Options
 from ..report import Change, changes_of, hint_on
 from .companions import companions, copied
-from .flatten import Surface, flatten
+from .flatten import Surface, check_copies, flatten
 from .formats import FORMATS, held, read_within
 from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
@@ -428,7 +428,13 @@ def _flattened(
     changes: list[Change] = []
     if options.compress != "none":
         changes.append(NOT_COMPRESSED)
-    scene = refine_scene(data, media, options, model, limits, course, siblings)
+    # How many faces a goal makes of one is not known yet.
+    each = 1 if options.goals else 4**options.levels
+
+    def check(upload: Upload) -> None:
+        check_copies(upload, {plan.mesh: each * plan.faces for plan in upload.plans}, limits)
+
+    scene = refine_scene(data, media, options, model, limits, course, siblings, check)
     with course.stage("write", 0.95, 1.0):
         surfaces = {
             mesh: [Surface.of(primitive) for primitive in refined]

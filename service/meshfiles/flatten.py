@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,6 +42,15 @@ from .pose import joint_matrices, posed
 
 TRANSFORM, VISIBILITY = "KHR_texture_transform", "KHR_node_visibility"
 LOST = ("textures", "images", "animations", "skins", "cameras", "extensions")
+# Where a node stands that does not say.
+UNMOVED = {
+    "translation": np.zeros(3),
+    "rotation": np.array([0.0, 0.0, 0.0, 1.0]),
+    "scale": np.ones(3),
+    "matrix": np.eye(4).reshape(-1),
+}
+# What placing a copy costs beside its faces, in faces; each joint of a skin costs one more.
+COPY_COST = 100
 _COPY_ATTRIBUTES = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
 
 
@@ -79,16 +89,9 @@ def flatten(
     faces = {
         mesh: sum(len(each.primitive.corners) for each in own) for mesh, own in primitives.items()
     }
-    worlds, hidden = _placed_nodes(upload.tree)
-    shown = [
-        (node, mesh)
-        for node in worlds
-        if (mesh := upload.document.nodes[node].mesh) in primitives and node not in hidden
-    ]
-    if not shown:
-        raise UnrefinableError("the default scene shows no triangles")
-    total = sum(faces[mesh] * _copy_count(upload, node) for node, mesh in shown)
-    check_limit("faces", total, limits.max_faces, f"the scene with all copies has {total} faces")
+    parents, hidden = _scene_nodes(upload.tree)
+    shown = check_copies(upload, faces, limits)
+    worlds = _world_matrices(upload.tree["nodes"], parents)
     placed, nodes = list[MeshFile](), list[str]()
     for node, mesh in shown:
         weights = _shown_weights(upload.document, node, mesh)
@@ -109,6 +112,32 @@ def flatten(
         if count:
             changes.append(Change("/nodes", f"{what} left out", count))
     return mesh_file, changes
+
+
+def check_copies(upload: Upload, faces: Mapping[int, int], limits: Limits) -> list[tuple[int, int]]:
+    """Check what it costs to place the copies of a scene's meshes, whose `faces` are known.
+
+    Returns the nodes that show one, each with its mesh.
+
+    Raises:
+        ServiceError: the scene shows none, or copies that its accessors do not agree on.
+        LimitError: the copies cost more than `max_faces`.
+    """
+    parents, hidden = _scene_nodes(upload.tree)
+    shown, total = list[tuple[int, int]](), 0
+    for number in parents:
+        node = upload.document.nodes[number]
+        if node.mesh is None or node.mesh not in faces or number in hidden:
+            continue
+        shown.append((number, node.mesh))
+        joints = 0 if node.skin is None else len(upload.document.skins[node.skin].joints)
+        cost = COPY_COST + joints + faces[node.mesh]
+        total += cost * _copy_count(upload, number)
+    if not shown:
+        raise UnrefinableError("the default scene shows no triangles")
+    text = f"the scene with all copies costs as much as {total} faces"
+    check_limit("faces", total, limits.max_faces, text)
+    return shown
 
 
 def _copy_count(upload: Upload, node: int) -> int:
@@ -147,6 +176,8 @@ def _pointer(node: int) -> str:
 def _copies(upload: Upload, node: int) -> Float[np.ndarray, "N 4 4"]:
     """Return the matrices of a node's copies, in its own space: one that moves nothing without."""
     indices, count = _copied(upload, node), _copy_count(upload, node)
+    if not indices:
+        return np.eye(4)[None]
     values = {name: _floats(upload, indices[name]) for name in _COPY_ATTRIBUTES if name in indices}
     still, ones = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), np.ones((count, 3))
     quaternions = values.get("ROTATION", still)
@@ -185,8 +216,8 @@ def _placements(
     return matrices
 
 
-def _placed_nodes(tree: dict[str, Any]) -> tuple[dict[int, Float[np.ndarray, "4 4"]], set[int]]:
-    """Return the world matrices of the default scene's nodes, in the order of its tree.
+def _scene_nodes(tree: dict[str, Any]) -> tuple[dict[int, int | None], set[int]]:
+    """Return the parents of the default scene's nodes, in the order of its tree.
 
     And which of them are hidden, as all below a hidden one is.
     """
@@ -198,20 +229,30 @@ def _placed_nodes(tree: dict[str, Any]) -> tuple[dict[int, Float[np.ndarray, "4 
     roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else parentless
     # A root that is a child too stands where its parent puts it: those without parents come first.
     ordered = sorted(roots, key=lambda root: root in children)
-    pending = [(root, np.eye(4), False) for root in reversed(ordered)]
-    placed: dict[int, Float[np.ndarray, "4 4"]] = {}
+    pending: list[tuple[int, int | None]] = [(root, None) for root in reversed(ordered)]
+    parents: dict[int, int | None] = {}
     hidden: set[int] = set()
     while pending:
-        number, above, under_hidden = pending.pop()
+        number, parent = pending.pop()
         # Once, whatever its parents: n nodes that are twice among the children of one are 2^n.
-        if number in placed:
+        if number in parents:
             continue
-        node = nodes[number]
-        placed[number] = world = above @ _local_matrix(node)
-        if hides := under_hidden or _is_hidden(node):
+        parents[number] = parent
+        if parent in hidden or _is_hidden(nodes[number]):
             hidden.add(number)
-        pending += [(child, world, hides) for child in reversed(node.get("children", []))]
-    return placed, hidden
+        pending += [(child, number) for child in reversed(nodes[number].get("children", []))]
+    return parents, hidden
+
+
+def _world_matrices(
+    nodes: list[dict[str, Any]], parents: dict[int, int | None]
+) -> dict[int, Float[np.ndarray, "4 4"]]:
+    """Return where each node stands; parents come before their children. Raises GltfError."""
+    worlds: dict[int, Float[np.ndarray, "4 4"]] = {}
+    local = _local_matrices(nodes, parents.keys())
+    for (number, parent), matrix in zip(parents.items(), local, strict=True):
+        worlds[number] = (np.eye(4) if parent is None else worlds[parent]) @ matrix
+    return worlds
 
 
 def _is_hidden(node: dict[str, Any]) -> bool:
@@ -224,12 +265,29 @@ def _children(nodes: list[dict[str, Any]]) -> list[int]:
     return [child for node in nodes for child in node.get("children", [])]
 
 
-def _local_matrix(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    given = (("translation", (0, 0, 0)), ("rotation", (0, 0, 0, 1)), ("scale", (1, 1, 1)))
-    parts = (np.array([node.get(name, usual)], dtype=np.float64) for name, usual in given)
-    return _placements(*parts)[0]
+def _local_matrices(
+    nodes: list[dict[str, Any]], numbers: Iterable[int]
+) -> Float[np.ndarray, "N 4 4"]:
+    columns = {
+        name: np.array([_numbers(nodes, number, name, usual) for number in numbers])
+        for name, usual in UNMOVED.items()
+    }
+    matrices = _placements(*(columns[name] for name in ("translation", "rotation", "scale")))
+    given = [("matrix" in nodes[number]) for number in numbers]
+    matrices[given] = columns["matrix"][given].reshape(-1, 4, 4).transpose(0, 2, 1)
+    return matrices
+
+
+def _numbers(
+    nodes: list[dict[str, Any]], number: int, name: str, usual: Float[np.ndarray, " K"]
+) -> Float[np.ndarray, " K"]:
+    if name not in nodes[number]:
+        return usual
+    with suppress(TypeError, ValueError, OverflowError):
+        values = np.array(nodes[number][name], dtype=np.float64)
+        if values.shape == usual.shape and np.isfinite(values).all():
+            return values
+    raise GltfError(f"{name} must be {len(usual)} numbers", pointer=f"/nodes/{number}/{name}")
 
 
 def _shown_weights(document: Document, node: int, mesh: int) -> list[float]:
@@ -301,9 +359,9 @@ def _turned(
     normals: Float[np.ndarray, "N 3"], matrix: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "N 3"]:
     """Return normals as a matrix turns them: by its cofactors, which keep them outward."""
-    x, y, z = matrix[:3, :3]
-    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
-    sign = np.sign(np.linalg.det(matrix[:3, :3])) or 1.0
+    linear = matrix[:3, :3]
+    cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]])
+    sign = np.sign(np.linalg.det(linear)) or 1.0
     return unit(sign * normals.astype(np.float64) @ cofactors.T)
 
 

@@ -115,10 +115,14 @@ _MODELS = Models()
 
 
 def warm_up(model: Model | str | None, providers: Sequence[str] | None = None) -> None:
-    """Import and load what the first request would otherwise wait for. Raises NoModelError."""
-    from ..meshfiles import convert  # noqa: F401
+    """Import, load and run what first jobs would wait for, and then keep. Raises NoModelError."""
+    from ..bodies import uploads  # noqa: F401
+    from ..meshfiles.convert import converted
 
     hold_model(model, providers)
+    for face in (b"f 1 2 3", b"f 1 2 3 4"):
+        made = b"v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\n" + face
+        converted(made, "obj", "glb", Options(levels=1), _MODELS.get(), Limits())
 
 
 def hold_model(model: Model | str | None, providers: Sequence[str] | None = None) -> None:

@@ -43,44 +43,30 @@ class ProgressPage:
             except OSError as error:
                 raise NoStorageError(f"no page can be mapped: {error.strerror}") from error
             held.pop_all()
-        # None once nobody writes any more; the last that was read stays.
-        self._words: memoryview[int] | None = memoryview(self._map).cast("q")
-        self._last: tuple[str | None, float] = (None, 0.0)
+        self._words = memoryview(self._map).cast("q")
 
     def __enter__(self) -> ProgressPage:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Keep what the page says of a job that has ended, and neither file nor memory."""
-        if self._words is not None:
-            self._last = self.stage, self.share
-            self._words.release()
-            self._words = None
-            self._map.close()
-            self.file.close()
+        self._words.release()
+        self._map.close()
+        self.file.close()
 
     @property
     def stage(self) -> str | None:
         """Stage of the worker; None before it begins."""
-        if self._words is None:
-            return self._last[0]
         number = self._words[_STAGE]
         return STAGES[number - 1] if 1 <= number <= len(STAGES) else None
 
     @property
     def share(self) -> float:
         """Share of the job that is done, 0 … 1."""
-        if self._words is None:
-            return self._last[1]
         return min(max(self._words[_DONE] / _SCALE, 0.0), 1.0)
 
     def stop(self) -> None:
         """Ask the worker to end the job where it next looks."""
-        if self._words is not None:
-            self._words[_STOP] = 1
+        self._words[_STOP] = 1
 
 
 class Reporter:

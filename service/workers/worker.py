@@ -12,9 +12,8 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from pathlib import Path
 from typing import TypeVar
 
 from .. import log_lines
@@ -23,10 +22,6 @@ from ..log_lines import REQUEST_ID
 
 T = TypeVar("T")
 
-# Out of memory, the kernel should take a worker (one request) before the server (all of them): so
-# much is added to its preference, of the most that there is.
-OOM_PREFERENCE = 500
-MOST_PREFERRED = 1000
 # New objects between two searches for cycles. A scene of thousands of meshes is hundreds of
 # thousands of objects, hardly one of them in a cycle: to search them as often as usual is a fifth
 # of its time.
@@ -50,17 +45,6 @@ def prepare() -> None:
     # run.
     os.setsid()
     end_with_parent()
-    prefer(Path("/proc/self/oom_score_adj"))
-
-
-def prefer(file: Path) -> None:
-    """Have the kernel prefer the process of a file of /proc where memory runs out.
-
-    What there is is added to: a cluster gives pods a preference of their own, and to go below it
-    is refused. A worker does its work without any, too.
-    """
-    with suppress(OSError):
-        file.write_text(str(min(int(file.read_text()) + OOM_PREFERENCE, MOST_PREFERRED)))
 
 
 def call(function: Callable[..., T], *arguments: object) -> T:

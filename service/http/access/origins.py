@@ -19,7 +19,7 @@ from ...settings import Settings
 from .. import problems
 
 # What these ask for costs little, and no page of another origin is shown the answer.
-SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+SAFE = frozenset({"GET", "OPTIONS"})
 # What a browser says of who asks: a page of this origin, or nobody but the user.
 OWN = frozenset({"same-origin", "none"})
 

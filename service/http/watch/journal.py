@@ -15,6 +15,7 @@ from ...errors import BusyError
 from ...log_lines import HEADER, REQUEST_ID, id_of
 from .. import problems
 from ..access.clients import Client
+from .tracing import mark_span
 
 log = logging.getLogger("pns.request")
 
@@ -34,8 +35,6 @@ class Entry:
         route: its pattern (`/assets/{name}`), never what was in it; `none` where none matched.
         code: the problem's code, or empty.
         received, sent: bytes of the bodies.
-        began: seconds of Unix time.
-        caller: the headers of the W3C that say whose trace it is part of.
     """
 
     id: str
@@ -47,26 +46,28 @@ class Entry:
     received: int
     sent: int
     seconds: float
-    began: float
-    caller: dict[str, str]
 
 
 class Journal:
-    """ASGI layer that names requests and writes down how each ended, and tells others.
+    """ASGI layer that names requests, writes down how each ended, and tells `count`.
 
     Neither query strings nor paths are written: they may hold what a client would not like to see
     in a log (a file's name).
     """
 
-    def __init__(self, app: ASGIApp, *others: Callable[[Entry], None]) -> None:
+    def __init__(self, app: ASGIApp, count: Callable[[Entry], None]) -> None:
         self.app = app
-        self.others = others
+        self.count = count
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        began, clock = time.time(), time.perf_counter()
+        clock, method = time.perf_counter(), scope["method"]
+        if method == "HEAD":
+            # Of the answer uvicorn sends the head alone.
+            scope = {**scope, "method": "GET"}
         name = id_of(scope["headers"])
         token = REQUEST_ID.set(name)
+        mark_span(name)
         state = scope.setdefault("state", {})
         state["request_id"] = name
         status, received, sent, whole = 0, 0, 0, False
@@ -102,7 +103,7 @@ class Journal:
             self._write(
                 Entry(
                     id=name,
-                    method=scope["method"] if scope["method"] in METHODS else "other",
+                    method=method if method in METHODS else "other",
                     route=_route(scope),
                     status=status if whole or status >= 400 else GONE,
                     code=state.get("problem", ""),
@@ -110,19 +111,16 @@ class Journal:
                     received=received,
                     sent=sent,
                     seconds=time.perf_counter() - clock,
-                    began=began,
-                    caller=_caller(scope),
                 )
             )
             REQUEST_ID.reset(token)
 
     def _write(self, entry: Entry) -> None:
         fields = asdict(entry)
-        name, _, _ = (fields.pop(own) for own in ("id", "began", "caller"))
+        name = fields.pop("id")
         fields["milliseconds"] = round(1000 * fields.pop("seconds"), 1)
         log.info("request", extra={"fields": fields, "request_id": name})
-        for tell in self.others:
-            tell(entry)
+        self.count(entry)
 
 
 def _route(scope: Scope) -> str:
@@ -139,11 +137,3 @@ def _client(scope: Scope) -> str:
     if isinstance(known, Client):
         return known.id
     return scope["client"][0] if scope.get("client") else ""
-
-
-def _caller(scope: Scope) -> dict[str, str]:
-    return {
-        name.decode(): value.decode("latin-1")
-        for name, value in scope["headers"]
-        if name in (b"traceparent", b"tracestate")
-    }

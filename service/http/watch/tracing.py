@@ -1,7 +1,7 @@
-"""Traces by OpenTelemetry, where the extra `tracing` is installed and an endpoint is named.
+"""Traces by FastAPI's own OpenTelemetry, where the extra `tracing` is installed.
 
 The standard variables say where they go (`OTEL_EXPORTER_OTLP_ENDPOINT` and its kin). Like the log,
-spans hold neither paths nor queries: FastAPI's own would.
+spans hold neither paths nor queries, which FastAPI's would.
 """
 
 # The extra is not installed where this is checked.
@@ -11,23 +11,22 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from .journal import METHODS, Entry
+from opentelemetry import trace
 
 if TYPE_CHECKING:
-    from opentelemetry.trace import Tracer
+    from opentelemetry.sdk.trace import TracerProvider
 
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
-NAME = "pns"
-# What OpenTelemetry calls a method that it does not know.
-OTHER = "_OTHER"
+# Attributes whose values strangers choose.
+HIDDEN = ("url.path", "url.query", "server.address", "http.request.method_original")
 
 
 class TracingError(Exception):
     """Traces are wanted, and what sends them is not installed."""
 
 
-def tracer_from_environment() -> Tracer | None:
-    """Make a tracer that sends to the endpoint that the environment names; None if it names none.
+def provider_from_environment() -> TracerProvider | None:
+    """Make a provider that sends to the endpoint that the environment names; None if none is.
 
     Raises:
         TracingError: the extra is not installed.
@@ -44,31 +43,14 @@ def tracer_from_environment() -> Tracer | None:
             f"{ENDPOINTS[0]} is set and OpenTelemetry is not installed: "
             "pip install 'pns-subdivision[service,tracing]'"
         ) from error
-    name = os.environ.get("OTEL_SERVICE_NAME", NAME)
+    name = os.environ.get("OTEL_SERVICE_NAME", "pns")
     provider = TracerProvider(resource=Resource.create({SERVICE_NAME: name}))
     provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter()))
-    return provider.get_tracer(NAME)
+    return provider
 
 
-def record(tracer: Tracer, entry: Entry) -> None:
-    """Make the span of a request that has ended, under the caller's where it sent one."""
-    from opentelemetry import propagate
-    from opentelemetry.trace import SpanKind, StatusCode
-
-    # Anything may be sent as a method: of names without end others make series without end.
-    method = entry.method if entry.method in METHODS else OTHER
-    span = tracer.start_span(
-        f"{method} {entry.route}",
-        context=propagate.extract(entry.caller),
-        kind=SpanKind.SERVER,
-        start_time=int(1e9 * entry.began),
-        attributes={
-            "http.request.method": method,
-            "http.route": entry.route,
-            "http.response.status_code": entry.status,
-            "pns.request_id": entry.id,
-        },
-    )
-    if entry.status >= 500:
-        span.set_status(StatusCode.ERROR)
-    span.end()
+def mark_span(request_id: str) -> None:
+    """Name the request in its span, if it has one, and hide there what strangers choose."""
+    span = trace.get_current_span()
+    if span.is_recording():
+        span.set_attributes({"pns.request_id": request_id} | dict.fromkeys(HIDDEN, ""))

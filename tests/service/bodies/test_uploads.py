@@ -35,20 +35,6 @@ def multipart(**files):
 FORM = "multipart/form-data; boundary=X"
 
 
-@pytest.mark.parametrize(
-    ("body", "content_type"),
-    [
-        (part_glb(), "model/gltf-binary"),
-        (archive(a__glb=part_glb()), "application/zip"),
-        (multipart(file=part_glb()), FORM),
-        (multipart(file=archive(a__glb=part_glb())), FORM),
-    ],
-)
-def test_a_glb_comes_alone_in_an_archive_or_in_a_part(body, content_type):
-    received = sent(body, content_type, Limits())
-    assert (received.data, received.kind) == (part_glb(), "glb")
-
-
 def test_an_archive_in_an_archive_is_refused():
     nested = archive(a__glb=archive(b__glb=part_glb()))
     with pytest.raises(MediaTypeError, match="is an archive"):

@@ -96,21 +96,6 @@ def test_a_chunked_body_in_ordinary_pieces_is_taken(front):
         assert (answer.status, answer.read()) == (200, b"".join(pieces))
 
 
-def test_a_body_in_countless_pieces_keeps_nobody_out(front):
-    """The service alone parses them in one go, and recovers; the proxy takes them together."""
-    with connect(front) as connection, suppress(OSError):
-        connection.sendall(head("POST", "/subdivide", CHUNKED) + b"1\r\nx\r\n" * 100_000)
-    wait_until_served(front)
-
-
-def test_a_client_that_only_sends_and_never_reads_keeps_nobody_out(front):
-    with connect(front) as connection, suppress(OSError):
-        connection.settimeout(2)
-        while True:
-            connection.sendall(head("GET", "/openapi.json") * 64)
-    wait_until_served(front)
-
-
 @pytest.mark.parametrize(
     "sent",
     [

@@ -23,7 +23,7 @@ from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 from tests.support.networks import DEFAULT_CARD
-from tests.support.packages import served_file, several_models
+from tests.support.packages import several_models
 
 GLB = {"Content-Type": "model/gltf-binary", "Accept": "application/json"}
 REPORT = "/subdivide?diagnostics=none"
@@ -148,35 +148,6 @@ def test_the_list_is_kept_by_clients_and_asked_for_again_at_no_cost(client: Test
     assert (again.status_code, again.content) == (304, b"")
     assert again.headers["etag"] == tag
     assert client.get("/models", headers={"If-None-Match": '"other"'}).status_code == 200
-
-
-def test_the_description_has_the_list_and_its_errors(client: TestClient) -> None:
-    responses = client.get("/openapi.json").json()["paths"]["/models"]["get"]["responses"]
-    assert set(responses) == {"200", "304", "401", "429", "500", "503"}
-    schema = responses["200"]["content"]["application/json"]["schema"]
-    assert schema["items"] == {"$ref": "#/components/schemas/ModelEntry"}
-
-
-def test_a_served_file_has_a_name_too(folder: Path, tmp_path: Path) -> None:
-    mine = served_file(tmp_path / "mine.onnx")
-    with served(folder, mine) as client:
-        assert report(client, "")["model"] == "mine"
-        assert report(client, "model=mine") == report(client, "")
-        assert report(client, "model=paper")["model"] == "paper"
-        listed = {entry["name"]: entry["default"] for entry in client.get("/models").json()}
-        assert listed["mine"]
-        assert not listed["paper"]
-        names = sorted({"broken", "mine", "paper", "vertices", DEFAULT_MODEL})
-        assert_unknown(subdivide(client, f"model={mine}"), names)
-
-
-def test_without_the_served_model_the_bundled_ones_work(folder: Path) -> None:
-    with served(folder, "missing.onnx") as client:
-        for query in ("", "model=missing"):
-            assert subdivide(client, query).status_code == 503
-        assert report(client, "model=paper")["model"] == "paper"
-        assert not any(entry["default"] for entry in client.get("/models").json())
-        assert client.get("/readyz").status_code == 503
 
 
 def test_the_log_names_the_model(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:

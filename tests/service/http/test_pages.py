@@ -106,11 +106,6 @@ def test_a_file_that_is_none_of_the_pages_is_not_found(folder: str, name: str) -
     assert answer.headers["Content-Type"] == "application/problem+json"
 
 
-def test_head_answers_like_get_without_a_body() -> None:
-    assert CLIENT.head("/").headers["ETag"] == CLIENT.get("/").headers["ETag"]
-    assert CLIENT.head("/").content == b""
-
-
 def test_the_first_visit_loads_less_than_350_kb() -> None:
     # The entry and what it imports at once; validator, decoders and readers wait until needed.
     text = {path.name: path.read_text() for path in ASSETS if path.suffix == ".js"}

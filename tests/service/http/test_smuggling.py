@@ -39,71 +39,36 @@ def answers(front, sent):
 
 CASES = {
     "both lengths": post(b"Content-Length: 5\r\nTransfer-Encoding: chunked\r\n", b"0\r\n\r\n"),
-    "both lengths, chunked first": post(
-        b"Transfer-Encoding: chunked\r\nContent-Length: 5\r\n", b"0\r\n\r\n"
-    ),
     "two lengths": post(b"Content-Length: 0\r\nContent-Length: 9\r\n"),
-    "a list of lengths": post(b"Content-Length: 0, 9\r\n"),
     "a length with a sign": post(b"Content-Length: +0\r\n"),
-    "a length in base 16": post(b"Content-Length: 0x0\r\n"),
-    "a length in other digits": post("Content-Length: ٠\r\n".encode()),
     "a length of thousands of digits": post(b"Content-Length: " + b"9" * 5000 + b"\r\n"),
     "nearly chunked": post(b"Transfer-Encoding: xchunked\r\n", b"0\r\n\r\n"),
-    "chunked and more": post(b"Transfer-Encoding: identity, chunked\r\n", b"0\r\n\r\n"),
     "chunked twice": post(b"Transfer-Encoding: chunked\r\n" * 2, b"0\r\n\r\n"),
     "a space before the colon": post(b"Transfer-Encoding : chunked\r\n", b"0\r\n\r\n"),
-    "chunked behind a control": post(b"Transfer-Encoding:\x0bchunked\r\n", b"0\r\n\r\n"),
     "chunked in HTTP/1.0": post(b"Transfer-Encoding: chunked\r\n", b"0\r\n\r\n", version=b"1.0"),
-    "a folded length": post(b"Transfer-Encoding:\r\n chunked\r\n", b"0\r\n\r\n"),
     "a folded line": get(b"Host: localhost\r\nX: b\r\n\tc\r\n"),
     "lines without CR": b"GET /limits HTTP/1.1\nHost: a\n\n",
-    "one line without CR": get(b"Host: localhost\r\nX: b\nY: c\r\n"),
-    "lines without LF": b"GET /limits HTTP/1.1\rHost: localhost\r\r\n\r\n",
-    "CR in a value": get(b"Host: localhost\r\nX: b\rContent-Length: 9\r\n"),
     "NUL in a value": get(b"Host: localhost\r\nX: b\0c\r\n"),
     "two hosts": get(b"Host: localhost\r\nHost: b\r\n"),
     "no host": get(b""),
-    "a line without colon": get(b"Host: localhost\r\nnonsense\r\n"),
-    "a chunk's size ends in LF": chunked(b"1\nx\r\n0\r\n\r\n"),
-    "a chunk ends in LF": chunked(b"1\r\nx\n0\r\n\r\n"),
     "a chunk is longer than it says": chunked(b"1\r\nxyz\r\n0\r\n\r\n"),
     "a chunk's size with a sign": chunked(b"-1\r\nx\r\n0\r\n\r\n"),
-    "a chunk's size with 0x": chunked(b"0x1\r\nx\r\n0\r\n\r\n"),
-    "a chunk's size behind a space": chunked(b" 1\r\nx\r\n0\r\n\r\n"),
     "a line end in a chunk's extension": chunked(b"1;a\nb\r\nx\r\n0\r\n\r\n"),
-    "the last chunk ends in LF": chunked(b"1\r\nx\r\n0\n\r\n"),
-    "a body ends in LF": chunked(b"1\r\nx\r\n0\r\n\n"),
     "a trailer ends in LF": chunked(b"1\r\nx\r\n0\r\nX: a\n\n"),
-    "a target of no host": get(b"Host: localhost\r\n", b"http:///limits"),
-    "a target of a user": get(b"Host: localhost\r\n", b"http://u:p@a/limits"),
     "a target of half an address": get(b"Host: localhost\r\n", b"http://[::1/limits"),
-    "a target with a host, and no Host": get(b"", b"http://a/limits"),
     "a target with a host, and two Hosts": get(
         b"Host: localhost\r\nHost: b\r\n", b"http://a/limits"
     ),
     "the preface of HTTP/2": b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
     "a head that is too long": get(b"Host: localhost\r\n", b"/limits?" + b"a" * HEAD_BYTES),
-    "extensions of chunks": chunked(b"1;a=b\r\nx\r\n0;c\r\n\r\n"),
     "trailers": chunked(b"0\r\nContent-Length: 99\r\nAuthorization: Bearer x\r\n\r\n"),
-    "the same length twice": post(b"Content-Length: 0\r\n" * 2),
     "a body that nobody reads": get(b"Host: localhost\r\nContent-Length: 5\r\n") + b"hello",
     "an upgrade to HTTP/2": get(b"Host: localhost\r\nConnection: Upgrade\r\nUpgrade: h2c\r\n"),
-    "a long query": get(b"Host: localhost\r\n", b"/limits?" + b"a" * 15000),
-    "a long path": get(b"Host: localhost\r\n", b"/" + b"a/" * 7000),
     "a path that climbs": get(b"Host: localhost\r\n", b"/" + b"%2e%2e%2f" * 1500),
-    "a target with a host": get(b"Host: localhost\r\n", b"http://b.example:80/limits?x=1"),
-    "a target with an address": get(b"Host: localhost\r\n", b"HTTPS://[::1]/limits"),
-    "a target of another protocol": get(b"Host: localhost\r\n", b"ftp://b/limits"),
-    "a path of a target": get(b"Host: localhost\r\n", b"/http://b/limits"),
-    "a target with two slashes": get(b"Host: localhost\r\n", b"http://b//limits"),
     "a target with a body": (
         b"POST http://b/subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n\r\nhello"
     ),
     "many headers": get(b"Host: localhost\r\n" + b"".join(b"h%d: x\r\n" % n for n in range(1500))),
-    "many parameters": (
-        b"POST /subdivide?%b HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n"
-        % b"&".join(b"levels=%d" % n for n in range(1200))
-    ),
 }
 
 
@@ -115,12 +80,3 @@ def test_no_request_hides_in_another(front, case):
     if len(statuses) == 2:
         assert statuses[1] in (200, 400)
     assert said.count(b"faces_per_minute") <= statuses.count(200)
-
-
-@pytest.mark.parametrize("ranges", [b"0-0", b"-1", b"9-3", b",".join([b"0-"] * 2000)])
-def test_a_part_of_an_answer_is_the_whole_of_it(front, ranges):
-    head = b"Host: localhost\r\nConnection: close\r\nRange: bytes=" + ranges + b"\r\n"
-    whole = answers(front, get(b"Host: localhost\r\nConnection: close\r\n", b"/"))
-    part = answers(front, get(head + b'If-Range: "x"\r\n', b"/"))
-    assert part[0] == [200]
-    assert part[1].partition(b"\r\n\r\n")[2] == whole[1].partition(b"\r\n\r\n")[2]

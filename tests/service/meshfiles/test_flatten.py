@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from service.course import Course
 from service.errors import GltfError, LimitError, UnrefinableError
 from service.meshfiles.convert import converted
 from service.meshfiles.formats import read, write
@@ -12,34 +13,12 @@ from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import octahedron
 
 
-def test_a_mesh_stands_where_its_nodes_put_it():
-    tree, binary = files.document([octahedron()])
-    tree["nodes"] = [{"children": [1], "scale": [2, 2, 2]}, {"mesh": 0, "translation": [1, 0, 0]}]
-    tree["scenes"][0]["nodes"] = [0]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    own = 2 * (octahedron()["POSITION"] + [1, 0, 0])
-    assert len(flat.faces) == len(np.asarray(octahedron()["indices"]).reshape(-1, 3))
-    for axis in range(3):
-        extent = (flat.vertices[:, axis].min(), flat.vertices[:, axis].max())
-        assert extent == pytest.approx((own[:, axis].min(), own[:, axis].max()), abs=1e-6)
-
-
 def test_a_scene_that_shows_no_triangles_is_told():
     tree, binary = files.document([octahedron()])
     tree["scenes"].append({"nodes": []})
     tree["scene"] = 1
     with pytest.raises(UnrefinableError, match="shows no triangles"):
         flatten(files.pack(tree, binary), "obj", Limits())
-
-
-def test_without_scenes_children_still_stand_where_their_parents_do():
-    tree, binary = files.document([octahedron()])
-    del tree["scenes"], tree["scene"]
-    tree["nodes"] = [{"mesh": 0}, {"children": [0], "translation": [5, 0, 0]}]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    assert len(flat.faces) == 8
-    assert flat.vertices[:, 0].min() == pytest.approx(4)
-    assert flat.vertices[:, 0].max() == pytest.approx(6)
 
 
 def test_morph_targets_that_are_lost_are_told():
@@ -76,15 +55,40 @@ def test_every_copy_stands_where_its_attributes_put_it():
     np.testing.assert_allclose([second.min(axis=0), second.max(axis=0)], expected, atol=1e-5)
 
 
-def test_copies_without_end_are_refused_before_they_are_made():
-    with pytest.raises(LimitError, match="with all copies"):
-        flatten(copied(TRANSLATION=np.zeros((20, 3))), "stl", Limits(max_faces=100))
+@pytest.mark.parametrize("copies", [60_000, 4000])
+def test_copies_that_cost_too_much_are_refused_before_anything_is_refined(copies):
+    """Each costs its faces, eight or 512 of them, and what placing one takes."""
+    data, stages = copied(TRANSLATION=np.zeros((copies, 3))), list[str]()
+    options = Options(scheme="loop", levels=1 if copies > 10_000 else 4)
+    course = Course(begins=stages.append)
+    with pytest.raises(LimitError, match="with all copies") as refused:
+        converted(data, "glb", "stl", options, None, Limits(), course)
+    assert (refused.value.limit, refused.value.status, stages) == ("faces", 413, ["read"])
 
 
 def test_copies_that_their_accessors_do_not_agree_on_are_refused():
     data = copied(TRANSLATION=np.zeros((2, 3)), SCALE=np.ones((3, 3)))
     with pytest.raises(GltfError, match="as many values"):
         flatten(data, "stl", Limits())
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("translation", [1, 2]),
+        ("rotation", ["a", 0, 0, 1]),
+        ("scale", [[1], [1], [1]]),
+        ("scale", {}),
+        ("matrix", [1.0] * 15),
+        ("matrix", "data:,"),
+    ],
+)
+def test_a_node_that_stands_nowhere_is_refused(name, values):
+    tree, binary = files.document([octahedron()])
+    tree["nodes"][0][name] = values
+    with pytest.raises(GltfError, match=f"{name} must be") as refused:
+        converted(files.pack(tree, binary), "glb", "obj", Options(scheme="loop"), None, Limits())
+    assert refused.value.pointer == f"/nodes/0/{name}"
 
 
 def test_texture_coordinates_are_written_as_the_material_transforms_them():
@@ -180,17 +184,6 @@ def test_hidden_nodes_and_what_is_below_them_are_left_out_and_told():
     tree["scenes"][0]["nodes"] = [0]
     with pytest.raises(UnrefinableError, match="shows no triangles"):
         flatten(files.pack(tree, binary), "obj", Limits())
-
-
-def test_joints_of_a_hidden_skeleton_move_what_is_shown():
-    rig = {"JOINTS_0": np.zeros((6, 4), np.uint8), "WEIGHTS_0": np.eye(4)[np.zeros(6, int)]}
-    tree, binary = files.document([octahedron() | rig])
-    tree["skins"] = [{"joints": [1]}]
-    bone = {"translation": [5, 0, 0], "extensions": {"KHR_node_visibility": {"visible": False}}}
-    tree["nodes"] = [{"mesh": 0, "skin": 0}, bone]
-    tree["scenes"][0]["nodes"] = [0, 1]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    assert flat.vertices[:, 0].min() == pytest.approx(4)
 
 
 @pytest.mark.parametrize("weld", ["position", "index"])

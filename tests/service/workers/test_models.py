@@ -8,14 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from starlette.requests import Request
 
 from pns_common.model import file as model_file
 from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.errors import InvalidParameter, NoModelError
-from service.http.answer import is_known
-from service.workers.models import Catalogue, ModelEntry, Models, catalogue_of
+from service.workers.models import ModelEntry, Models, catalogue_of
 from tests.support.packages import served_file, several_models
 from tests.support.stand_in_models import ZeroModel
 
@@ -139,13 +137,3 @@ def test_same_models_same_bytes_same_tag() -> None:
     assert (first, first.tag) == (again, again.tag)
     assert first.tag != catalogue_of(serving("vertices")).tag
     assert first.tag.strip('"') == hashlib.sha256(first.content).hexdigest()[:32]
-
-
-@pytest.mark.parametrize(
-    ("header", "known"),
-    [("{tag}", True), ("W/{tag}", True), ('"a", {tag}', True), ("*", True), ("", False)],
-)
-def test_a_client_that_has_the_list_is_recognised(header: str, known: bool) -> None:
-    tag = Catalogue((), b"[]").tag
-    headers = [(b"if-none-match", header.format(tag=tag).encode())]
-    assert is_known(tag, Request({"type": "http", "headers": headers})) is known

@@ -327,16 +327,6 @@ def test_ctrl_c_is_the_server_s_alone() -> None:
     run(scenario)
 
 
-def test_a_warm_up_that_cannot_be_sent_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    async def scenario() -> None:
-        async with workers(warm_up=lambda: None) as pool:
-            await do(pool, jobs.nothing)
-            assert not pool.ready
-
-    run(scenario)
-    assert any("a worker did not warm up" in message for message in caplog.messages)
-
-
 def test_one_client_leaves_a_worker_to_others_and_who_came_first_is_next(tmp_path: Path) -> None:
     """Six jobs without an end would else stop all work."""
 

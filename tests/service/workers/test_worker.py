@@ -5,8 +5,11 @@ import weakref
 
 import pytest
 
+from pns_common.model import session
 from service.errors import GltfError
-from service.workers import worker
+from service.meshfiles.convert import converted
+from service.options import Limits, Options
+from service.workers import jobs, worker
 
 
 class Thing:
@@ -61,17 +64,13 @@ def test_a_refusal_holds_nothing_of_its_job(kind: type[Exception]) -> None:
     assert caught.value.__cause__ is None
 
 
-@pytest.mark.parametrize(("given", "then"), [("0\n", "500"), ("875\n", "1000"), ("-998\n", "-498")])
-def test_a_worker_is_preferred_to_its_server_and_never_less_than_it_was(given, then, tmp_path):
-    """A pod of a cluster begins where it must not go below: at 875, or wherever its memory says."""
-    preference = tmp_path / "oom_score_adj"
-    preference.write_text(given)
-    worker.prefer(preference)
-    assert preference.read_text() == then
-
-
-def test_a_worker_starts_where_no_preference_can_be_had(tmp_path):
-    """Nor where there is none at all."""
-    tmp_path.joinpath("refused").mkdir()
-    worker.prefer(tmp_path / "refused")
-    worker.prefer(tmp_path / "missing")
+@pytest.mark.parametrize("face", [b"f 1 2 3", b"f 1 2 3 4"])
+def test_a_warm_worker_opens_no_network_in_its_first_job(
+    face: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would be kept from then on: a worker would seem to grow."""
+    jobs.warm_up(None)
+    monkeypatch.setattr(session, "_open_session", None)
+    mesh = b"v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\n" + face
+    made = converted(mesh, "obj", "glb", Options(levels=1), jobs._MODELS.get(), Limits())
+    assert made.report["model"] is not None
