@@ -184,9 +184,10 @@ web: web/node_modules/.ready
 web-test: $(DEV)/.ready web/node_modules/.ready
 	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=2 test/*.test.mjs
 
-# README's sheet and the page's example, of shapes made by code; then `make web`.
+# README's sheet, the page's example and the guides' pictures, of shapes made by code; then `make web`.
 pictures: kernels
 	$(DEV)/bin/python docs/picture.py
+	$(DEV)/bin/python docs/few_faces.py
 
 # The pictures of the page, and how fast the page is on this machine.
 web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready
