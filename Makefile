@@ -158,8 +158,8 @@ build/blender-site/.ready: $(DEV)/.ready constraints.txt
 # BPY_PLATFORM names another than this machine's (linux-x64, windows-x64 or macos-arm64), and LIBRARY its wheel.
 addon: addon-5.0
 
-addon-%: $(DEV)/.ready $(BLENDER)-%/.ready
-	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM) $(LIBRARY)
+addon-%: $(RELEASE)/.ready $(BLENDER)-%/.ready
+	$(RELEASE)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM) $(LIBRARY)
 
 # The newest zip for a version's Python.
 ZIP_FOR = $$(ls -t "$(CURDIR)"/dist/pns_refine-*-$$(basename "$$(readlink -f $(BLENDER)-$(1)/bin/python)").zip | head -1)

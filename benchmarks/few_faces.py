@@ -38,8 +38,9 @@ ABOUT = """# Faces only where the surface bends, beside other ways
 `python -m benchmarks.few_faces DENSE {count}` on {count} coarse meshes of at most {faces} faces, of
 shapes of the validation. *Error*: the largest distance of the limit surface (level {fine}) from
 the mesh, in per cent of the diagonal. *Faces*: over those of the first whole level whose error is
-at most {tolerance} %. Both are medians. *Borders*: how many more the meshes have than the control
-meshes, in all: a crack is one. *Crossing*: the share of faces that pass through others, the mean.
+at most {tolerance} %, or the last of {last}. Both are medians. *Borders*: how many more the meshes
+have than the control meshes, in all: a crack is one. *Crossing*: the share of faces that pass
+through others, the mean.
 """
 
 
@@ -178,7 +179,7 @@ def main() -> None:
 
 def report(rows: dict[str, dict[str, list[Row]]], count: int) -> str:
     """Return the tables of some shapes."""
-    text = ABOUT.format(count=count, faces=FACES, fine=FINE, tolerance=TOLERANCE)
+    text = ABOUT.format(count=count, faces=FACES, fine=FINE, tolerance=TOLERANCE, last=FINE - 1)
     for group, measured in rows.items():
         if not measured:
             continue

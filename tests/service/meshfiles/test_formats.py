@@ -22,6 +22,7 @@ from service.meshfiles.example import part
 from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import COLOUR, MATERIAL, NORMAL, UV, MeshFile, of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
+from service.meshfiles.stl import read_stl
 from service.meshfiles.triangulate import triangulated
 from service.options import Limits, Options
 from tests.support.shared import shared_path
@@ -76,6 +77,19 @@ def test_an_obj_of_many_materials_is_the_same_surface_as_one_of_few() -> None:
     corners = read.vertices[read.faces]
     assert np.array_equal(corners[: len(faces)], whole.vertices[whole.faces])
     assert len(corners) == 11 * len(faces)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"<html>", "not an STL file: it begins with '<html>'"),
+        (bytes(80) + b"\x09\0\0\0" + bytes(60), "cut off, or is none: it says 9 facets.*for 1"),
+        (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "cut off: it ends within"),
+    ],
+)
+def test_a_broken_stl_is_told_in_plain_words(data: bytes, words: str) -> None:
+    with pytest.raises(UnreadableError, match=words):
+        read_stl(data)
 
 
 def test_an_stl_of_many_solids_is_the_same_surface_as_one_of_few() -> None:
