@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from ...bodies.media import GLB_MAGIC, begins_as_json
-from ...errors import GltfError, UnreadableError, check_limit
+from ...errors import GltfError, UnreadableError, check_limit, quoted
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK, WIDEST
 
