@@ -1,15 +1,6 @@
 """The model file's graph of a network of directed edges: an encoder, its rounds, and the heads."""
 
-from torch import nn
-
-from export.onnx_graph import (
-    Graph,
-    answers_info,
-    array,
-    rows_info,
-    serialised,
-    silu,
-)
+from export.onnx_graph import Graph, answers_info, array, rows_info, serialised, silu
 from pns_common.model.card import ModelCard
 from pns_common.model.session import networks
 from train.models.directed import DirectedNet
@@ -26,15 +17,18 @@ def directed_bytes(network: DirectedNet, card: ModelCard) -> bytes:
     layers = layers_of(network, card)
     for each in held:
         graph.prefix = f"{each.given}_"
-        linear = [part for part in layers[each.given].modules() if isinstance(part, nn.Linear)]
-        value = each.given
-        for index, part in enumerate(linear):
-            weight = graph.constant(f"weight_{index}", array(part.weight))
-            bias = graph.constant(f"bias_{index}", array(part.bias))
-            last = index == len(linear) - 1
-            value = graph.apply(
-                "Gemm", value, weight, bias, output=each.answer if last else "", transB=1
-            )
+        value, own = each.given, layers[each.given]
+        for index, (weight, bias) in enumerate(own):
+            last = index == len(own) - 1
+            if bias is None:
+                read = weight.shape[1]
+                sizes = graph.shape("sizes", [read, each.columns - read])
+                parts = f"{each.given}_states", f"{each.given}_told"
+                value, added = graph.split(value, sizes, parts)
+            else:
+                added = graph.constant(f"bias_{index}", array(bias))
+            factors = value, graph.constant(f"weight_{index}", array(weight)), added
+            value = graph.apply("Gemm", *factors, output=each.answer if last else "", transB=1)
             if not last:
                 value = silu(graph, value)
     inputs = [rows_info(each.given, f"{each.given}_rows", each.columns) for each in held]

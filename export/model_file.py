@@ -92,7 +92,7 @@ def checkpoint_card(checkpoint: Checkpoint) -> ModelCard:
     """Return the model card of a checkpoint: the whole recipe, its machine and its metrics."""
     recipe: dict[str, Any] = msgspec.to_builtins(checkpoint.recipe)
     if checkpoint.recipe.directed is not None:
-        recipe["hidden"] = recipe["directed"]["hidden"]
+        del recipe["hidden"]  # which stands with the rule
     # One level of names: how it was trained stands beside the rest.
     name = recipe.pop("name")
     facts = {"recipe": RECORDED.get(name, name), **recipe, **recipe.pop("training")}

@@ -53,6 +53,11 @@ class Graph:
             self.constants.append(numpy_helper.from_array(array, name))
         return name
 
+    def split(self, value: str, sizes: str, parts: tuple[str, ...]) -> tuple[str, ...]:
+        """Add a node that cuts columns in parts, and return their names."""
+        self.nodes.append(helper.make_node("Split", [value, sizes], parts, axis=1))
+        return parts
+
     def apply(self, operator: str, *inputs: str, output: str = "", **attributes: Any) -> str:
         """Add a node and return its output's name."""
         name = output or f"{operator.lower()}_{len(self.nodes)}"

@@ -54,7 +54,6 @@ KINDS = {
         "fuzz",
         "service/http",
         "service/scale",
-        "service/test_assets.py",
         "service/cli",
         "service/web",
         "service/workers",
@@ -79,7 +78,6 @@ LONGEST = (
     "service/http/test_openapi.py",
     "soak/test_soak.py",
     "service/http/test_hostile.py",
-    "service/test_assets.py",
     "service/workers/test_pool.py",
     "web/test_bundle.py",
     "docs/test_site.py",
@@ -87,7 +85,6 @@ LONGEST = (
     "train/test_certificates.py",
     "train/test_pairs.py",
     "train/test_train_command.py",
-    "train/test_limit_training.py",
 )
 
 

@@ -182,14 +182,25 @@ def _levelled(values: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Sharpened(Connectivity):
-    """A mesh whose vertices have corner weights κ beside the sharpness of its edges."""
+    """A mesh whose vertices have corner weights κ beside the sharpness of its edges.
+
+    Attributes:
+        corners: κ.
+        marked: what of the edges' sharpness is not learned: all that counts at a border's vertices.
+    """
 
     corners: Float[Tensor, " V"]
+    marked: Float[Tensor, " E"]
 
     @cached_property
     def sharpest(self) -> tuple[Float[Tensor, "V 3"], Int[Tensor, "V 3"]]:
         """κ + (1 − κ) w of the three sharpest edges around each vertex, and their rims."""
-        weights, rims = super().sharpest
+        given = {each.name: getattr(self, each.name) for each in fields(Connectivity)}
+        as_marked = Connectivity(**{**given, "sharpness": self.marked})
+        border = torch.zeros(self.vertex_count, dtype=torch.bool)
+        border[self.edges[self.boundary].reshape(-1)] = True
+        pairs = zip(as_marked.sharpest, super().sharpest, strict=True)
+        weights, rims = (torch.where(border[:, None], ends, all_) for ends, all_ in pairs)
         kappa = self.corners[:, None]
         return kappa + (1 - kappa) * weights, rims
 
@@ -259,7 +270,8 @@ class DirectedRule:
         a, b = curves.sides
         turned = (curves.at_vertices > 0) * corner_share(1 + dot(unit(a), unit(b)))
         given = {field.name: getattr(mesh, field.name) for field in fields(Connectivity)}
-        return Sharpened(**{**given, "sharpness": w}, corners=torch.where(border, turned, kappa))
+        given |= {"sharpness": w, "corners": torch.where(border, turned, kappa)}
+        return Sharpened(**given, marked=mesh.sharpness)
 
     def gates(
         self, mesh: Connectivity, jumps: Float[Tensor, " E"]

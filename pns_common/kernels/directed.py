@@ -231,26 +231,26 @@ def pool(
         states: (2 E, W).
         starts, spokes: where the directed edges that leave each vertex begin, and these.
         total: (W,) for sums.
-        pooled: (V, 2 W) out; 0 at vertices without edges.
+        pooled: (end − begin, 2 W) out; 0 at vertices without edges.
     """
     width = states.shape[1]
     for v in range(max(begin, 0), end):
-        first, stop = starts[v], starts[v + 1]
+        i, first, stop = v - begin, starts[v], starts[v + 1]
         for k in range(width):
-            total[k], pooled[v, width + k] = 0.0, -math.inf if stop > first else 0.0
-        for i in range(first, stop):
-            s = spokes[i]
+            total[k], pooled[i, width + k] = 0.0, -math.inf if stop > first else 0.0
+        for spoke in range(first, stop):
+            s = spokes[spoke]
             for k in range(width):
                 total[k] += states[s, k]
-                pooled[v, width + k] = max(pooled[v, width + k], states[s, k])
+                pooled[i, width + k] = max(pooled[i, width + k], states[s, k])
         for k in range(width):
-            pooled[v, k] = total[k] / max(stop - first, 1)
+            pooled[i, k] = total[k] / max(stop - first, 1)
 
 
 @kernel
 def gather(
     states: f4_2d | f8_2d,
-    pooled: f4_2d | f8_2d,
+    told: f4_2d | f8_2d,
     edges: u4_2d,
     begin: int,
     end: int,
@@ -258,10 +258,12 @@ def gather(
 ):
     """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
 
-    A row of ``messages``, (2 (end − begin), 6 W), is the edge's own state, that of the reverse
-    edge, and what is pooled at its first and at its second vertex.
+    A row of ``messages``, (2 (end − begin), 2 W + H), is the edge's own state, that of the reverse
+    edge, and the sum of what both vertices tell: ``told``, (V, 2 H), holds what each tells the
+    edges that leave it, and those that reach it.
     """
-    width, count, edge_count = states.shape[1], end - begin, edges.shape[0]
+    width, hidden = states.shape[1], told.shape[1] // 2
+    count, edge_count = end - begin, edges.shape[0]
     for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]
         i, j = e - begin, count + e - begin
@@ -269,10 +271,9 @@ def gather(
             there, back = states[e, k], states[edge_count + e, k]
             messages[i, k], messages[i, width + k] = there, back
             messages[j, k], messages[j, width + k] = back, there
-        for k in range(2 * width):
-            at_a, at_b = pooled[a, k], pooled[b, k]
-            messages[i, 2 * width + k], messages[i, 4 * width + k] = at_a, at_b
-            messages[j, 2 * width + k], messages[j, 4 * width + k] = at_b, at_a
+        for k in range(hidden):
+            messages[i, 2 * width + k] = told[a, k] + told[b, hidden + k]
+            messages[j, 2 * width + k] = told[b, k] + told[a, hidden + k]
 
 
 @kernel

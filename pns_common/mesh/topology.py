@@ -162,6 +162,11 @@ class Topology:
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
     @property
+    def wears(self) -> Bool[np.ndarray, " E"]:
+        """Flags of the edges that are sharp for so many levels."""
+        return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
+
+    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
@@ -176,7 +181,11 @@ class Topology:
 
     @cached_property
     def sharpest(self) -> SharpVertices | None:
-        """The vertices on sharp and soft edges, and corners; None where there is none of all."""
+        """The vertices on sharp and soft edges, and corners; None where there is none of all.
+
+        At the ends of boundaries soft edges that are learned do not count, so that meshes that
+        share a boundary still meet there.
+        """
         if not (len(self.sharp_edges) or len(self.soft) or self.has_corners):
             return None
         edges = self.sharp_edges
@@ -185,6 +194,12 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
+        ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
+        if len(self.soft) and len(ends):
+            at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
+            marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
+            loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)
+            weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
         if self.has_corners:
             corner = self.corner_weights[:, None]
             weights = corner + (1 - corner) * weights

@@ -51,6 +51,7 @@ class ModelCard:
         fold_angle: θ of the fold guard, between 0 and 90 degrees.
         sharpness_levels: At how many levels sharp edges stay sharp, 0 … 16.
         width: W, how many numbers the state of a directed edge has.
+        hidden: H, how many numbers the hidden layer of a round has.
         rounds: How many rounds of messages these exchange.
     """
 
@@ -68,6 +69,7 @@ class ModelCard:
     fold_angle: float | None = None
     sharpness_levels: int | None = None
     width: int | None = None
+    hidden: int | None = None
     rounds: int | None = None
 
     def to_json(self) -> str:
@@ -108,6 +110,7 @@ NEEDED: Mapping[int, frozenset[str]] = MappingProxyType(
                 "fold_angle",
                 "sharpness_levels",
                 "width",
+                "hidden",
                 "rounds",
             }
         ),
@@ -142,6 +145,7 @@ _RANGES: Mapping[str, Range] = MappingProxyType(
             f"from 0 to {MOST_SHARPNESS_LEVELS}",
         ),
         "width": (lambda value: 2 <= value <= 128 and value % 2 == 0, "even, from 2 to 128"),
+        "hidden": (lambda value: 2 <= value <= 512 and value % 2 == 0, "even, from 2 to 512"),
         "rounds": (lambda value: 1 <= value <= 8, "from 1 to 8"),
     }
 )

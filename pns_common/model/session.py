@@ -30,8 +30,8 @@ CHUNK_ROWS = 4096
 # Chunks are padded to a multiple: for a single row onnxruntime may call another kernel.
 ROW_MULTIPLE = 16
 CPU = ("CPUExecutionProvider",)
-# Of a directed edge: states in a message, and answers without a face's.
-MESSAGE_PARTS, HEADS = 6, 8
+# Answers of a directed edge without a face's.
+HEADS = 8
 
 
 @runtime_checkable
@@ -78,13 +78,18 @@ def networks(card: ModelCard) -> tuple[Network, ...]:
     if card.format != DIRECTED_FORMAT:
         return (Network("features", EDGE_FEATURES[card.features], "correction", 3),)
     assert card.width is not None
+    assert card.hidden is not None
     assert card.rounds is not None
-    width, answers = card.width, heads_of(card)
-    rounds = (
-        Network(f"messages_{n}", MESSAGE_PARTS * width, f"update_{n}", width)
-        for n in range(1, card.rounds + 1)
-    )
+    width, hidden, answers = card.width, card.hidden, heads_of(card)
     encoder = Network("features", DIRECTED_FEATURES[card.features], "state", width)
+    rounds = (
+        network
+        for n in range(1, card.rounds + 1)
+        for network in (
+            Network(f"pooled_{n}", 2 * width, f"told_{n}", 2 * hidden),
+            Network(f"messages_{n}", 2 * width + hidden, f"update_{n}", width),
+        )
+    )
     return encoder, *rounds, Network("states", width, "heads", answers)
 
 
@@ -160,15 +165,16 @@ class OnnxModel:
             expected = f"an array of shape (N, {network.columns})"
             raise ParameterError(given, rows.shape, expected=expected)
         session, inputs = self._session(), self._unread_inputs(budget)
-        answers = np.empty((len(rows), network.answer_columns), dtype=np.float32)
-        for start in range(0, len(rows), CHUNK_ROWS):
+        chunks = list[np.ndarray]()
+        for start in range(0, max(len(rows), 1), CHUNK_ROWS):
             chunk = rows[start : start + CHUNK_ROWS]
             inputs[given] = self._padded(network, chunk)
             answer = self._run(session, network.answer, inputs)
             if answer.shape != (len(inputs[given]), network.answer_columns):
                 expected = f"{network.answer} of {network.answer_columns} columns, a row for each"
                 raise ModelError(self.name, expected=expected, found=f"shape {answer.shape}")
-            answers[start : start + len(chunk)] = answer[: len(chunk)]
+            chunks.append(answer[: len(chunk)])
+        answers = chunks[0] if len(chunks) == 1 else np.concatenate(chunks)
         if not np.isfinite(answers).all():
             expected = f"finite numbers in {network.answer}"
             raise ModelError(self.name, expected=expected, found="NaN or infinity")

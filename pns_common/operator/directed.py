@@ -33,17 +33,20 @@ class DirectedNetworks:
 
     Attributes:
         encoder: features → states, (N, W).
-        rounds: messages (N, 6 W) → what is added to states.
+        rounds: of each the vertices' network and the edges': what is pooled at a vertex, (N, 2 W) →
+            what it tells the edges that leave it and those that reach it, (N, 2 H); messages,
+            (N, 2 W + H) → what is added to states.
         heads: states → answers, (N, 8): z, y, two logits; (N, 9) with a height for faces.
-        width: W.
+        width, hidden: W and H.
         answers: 8 or 9.
         feature_type: the floating type of all rows between them.
     """
 
     encoder: Network
-    rounds: tuple[Network, ...]
+    rounds: tuple[tuple[Network, Network], ...]
     heads: Network
     width: int
+    hidden: int
     answers: int = kernels.FACE
     feature_type: type[np.floating[Any]] = np.float32
 
@@ -139,7 +142,7 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     leaving = np.empty(2 * count, dtype=np.uint32)
     kernels.find_leaving(edges, starts[:-1].copy(), leaving)
     states = np.empty((2 * count, width), dtype=kind)
-    pooled = np.empty((mesh.vertex_count, 2 * width), dtype=kind)
+    told = np.empty((mesh.vertex_count, 2 * networks.hidden), dtype=kind)
 
     def both(begin: int, end: int) -> tuple[slice, slice]:
         return slice(begin, end), slice(count + begin, count + end)
@@ -149,9 +152,14 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
         there, back = both(begin, end)
         states[there], states[back] = rows[: end - begin], rows[end - begin :]
 
+    def tell(network: Network, begin: int, end: int) -> None:
+        pooled = np.empty((end - begin, 2 * width), dtype=kind)
+        kernels.pool(states, starts, leaving, begin, end, np.empty(width), pooled)
+        told[begin:end] = checked_answers(network, pooled, told.shape[1])
+
     def hear(update: Network, begin: int, end: int) -> None:
-        messages = np.empty((2 * (end - begin), 6 * width), dtype=kind)
-        kernels.gather(states, pooled, edges, begin, end, messages)
+        messages = np.empty((2 * (end - begin), 2 * width + networks.hidden), dtype=kind)
+        kernels.gather(states, told, edges, begin, end, messages)
         more, (there, back) = checked_answers(update, messages, width), both(begin, end)
         # Both ways of an edge stand in one block: nobody else reads these rows any more.
         states[there] += more[: end - begin]
@@ -173,14 +181,9 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
                 own[there], own[back] = np.split(heads[:, column], 2)
 
     blocks.run(count, encode)
-    for update in networks.rounds:
-        level.blocks.quiet().run(
-            mesh.vertex_count,
-            lambda begin, end: kernels.pool(
-                states, starts, leaving, begin, end, np.empty(width), pooled
-            ),
-        )
-        blocks.run(count, partial(hear, update))
+    for at_vertices, at_edges in networks.rounds:
+        blocks.quiet().run(mesh.vertex_count, partial(tell, at_vertices))
+        blocks.run(count, partial(hear, at_edges))
     blocks.run(count, answer)
     of_vertices, vertex_logits = np.empty(level.points.shape), np.empty(mesh.vertex_count)
     read = of_leaving, corner_logits, starts, leaving

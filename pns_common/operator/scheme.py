@@ -171,9 +171,11 @@ def _directed_rule(model: Model, budget: float) -> DirectedRule:
     """Return the rule of a model of directed edges."""
     card = model.card
     encoder, *rounds, heads = (partial(_run, model, each.given) for each in networks(card))
-    width, kind = int(_given(model, "width")), getattr(model, "feature_type", np.float64)
+    pairs = tuple(zip(rounds[::2], rounds[1::2], strict=True))
+    sizes = int(_given(model, "width")), int(_given(model, "hidden")), heads_of(card)
+    kind = getattr(model, "feature_type", np.float64)
     return DirectedRule(
-        DirectedNetworks(encoder, tuple(rounds), heads, width, heads_of(card), kind),
+        DirectedNetworks(encoder, pairs, heads, *sizes, kind),
         card.gate_sharpness,
         _given(model, "vertex_gate_sharpness"),
         budget,

@@ -14,12 +14,15 @@ from service.options import Limits, Options
 from tests.support import node_tools
 from tests.support.shared import SHARED
 
-# What `make test` looks at: one level of the default model, and one of Loop. The rest is breadth:
-# tests/service/test_assets.py takes two.
+# What `make test` looks at: one level of the default model, and one of Loop. The rest is breadth.
 LOOKED_AT = ((0, None), (1, "pns"), (1, "loop"))
 BREADTH = ((2, "pns"), (2, "loop"))
-# Files that break their promises, or have nothing to refine; tests/service has their refusals.
-REFUSED = {"IndexOutOfRange.gltf", "BoxWithInfinites.glb", "empty_nodes.glb"}
+# Files that break their promises, or have nothing to refine: code and pointer of their refusal.
+REFUSED = {
+    "IndexOutOfRange.gltf": ("invalid-gltf", "/accessors/0"),
+    "BoxWithInfinites.glb": ("invalid-gltf", "/accessors/2"),
+    "empty_nodes.glb": ("unrefinable-mesh", "/meshes"),
+}
 
 
 def _rows():
@@ -33,7 +36,7 @@ def _rows():
 
 
 ROWS = _rows()
-NAMES = sorted(set(ROWS) - REFUSED)
+NAMES = sorted(set(ROWS) - set(REFUSED))
 
 
 @cache

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from service.errors import ServiceError
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from tests.conformance.collection import NAMES, ROWS, Conformance, refined
+from tests.conformance.collection import NAMES, REFUSED, ROWS, Conformance, refined
 from tests.conformance.surfaces import loop_step, open_edges, proper, welded
 from tests.support.gltf import files
 
@@ -33,6 +34,13 @@ STORAGE = {
 @pytest.fixture(scope="session")
 def conformance(tmp_path_factory):
     return Conformance(tmp_path_factory.mktemp("refined"))
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_wrong_is_refused_with_a_pointer(name):
+    with pytest.raises(ServiceError) as refusal:
+        refined(name, 1)
+    assert (refusal.value.code, refusal.value.pointer) == REFUSED[name]
 
 
 @ASSET

@@ -10,7 +10,6 @@ import export.run
 from export.model_file import RECORDED, checkpoint_card
 from export.run import FILE_OF_RECIPE
 from pns_common import load_model, pns
-from pns_common.model.file import DEFAULT_MODEL, bundled_models
 from train.data.datasets import ridge_held_out
 from train.fitting.determinism import machine_fingerprint
 from train.fitting.trainer import fit
@@ -29,11 +28,6 @@ BY_MODEL = {path.stem: recipe for recipe, path in FILE_OF_RECIPE.items()}
 QUICK = ("paper", "signed")
 
 each_model = pytest.mark.parametrize("name", sorted(BY_MODEL))
-
-
-def test_every_bundled_model_has_a_recipe_and_every_file_is_there():
-    assert sorted(BY_MODEL) == bundled_models(companions=True)
-    assert DEFAULT_MODEL in BY_MODEL
 
 
 # The nearest points of 32,768 faces on each of ten ridges: seven seconds, and on spheres forty.
@@ -142,16 +136,6 @@ def test_card_holds_the_recipe_as_it_stands(name):
     assert as_json(checkpoint_card(checkpoint).training) == as_json(training)
 
 
-def test_export_command_writes_the_same_bytes_twice(tmp_path):
-    path = tmp_path / "c.safetensors"
-    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
-    for name in ("one.onnx", "two.onnx"):
-        outcome = export_command(path, tmp_path / name)
-        assert outcome.exit_code == 0
-        assert "parity" in outcome.output
-    assert (tmp_path / "one.onnx").read_bytes() == (tmp_path / "two.onnx").read_bytes()
-
-
 def test_bundled_files_are_replaced_only_where_that_is_asked(tmp_path, monkeypatch):
     """A copy of the folder stands for the bundled one."""
     monkeypatch.setattr(export.run, "MODELS", tmp_path)
@@ -177,14 +161,6 @@ def test_export_command_refuses_what_is_no_checkpoint(tmp_path):
     assert outcome.exit_code == 1
     assert "expected safetensors" in outcome.output
     assert not (tmp_path / "m.onnx").exists()
-
-
-def test_export_command_refuses_a_folder_to_write_to(tmp_path):
-    path = tmp_path / "c.safetensors"
-    save_checkpoint(path, Checkpoint(paper(), initial_network(paper()), {}, "machine"))
-    outcome = export_command(path, tmp_path)
-    assert outcome.exit_code == 1
-    assert "expected a file" in outcome.output
 
 
 def test_export_command_names_files_as_they_are_called(tmp_path):

@@ -7,10 +7,17 @@ import random
 import struct
 from typing import Any
 
-from tests.fuzz.seeds import GLB, GLTF, Seed
+from service.bodies.media import FORMATS, GLB, GLTF
+from tests.fuzz.seeds import Seed
 
 NUMBERS = [-1, 0, 1, 2, 3, 4, 5, 7, 12, 100, 252, 5121, 5126, 65535, 2**31, 2**32 - 1, 2**53, 2**70]
 VALUES = [*NUMBERS, 0.5, -1e308, None, True, "", "POSITION", "data:,", "../x", [], [0], {}]
+
+WORDS = [
+    *(b"0", b"-1", b"3", b"255", b"99999999999", b"9" * 25, b"9" * 5000, b"1e39", b"1e400"),
+    *(b"nan", b"-inf", b"1e-320", b"0x10", b"1_0", b"\xff\xfe", b"\xe9t\xe9", b"\0", b"", b"#"),
+    *(b"f", b"v", b"solid", b"endsolid", b"vertex", b"element", b"list", b"\n", b"//", b"1/1/1"),
+]
 
 
 def mutated(seed: Seed, rng: random.Random) -> bytes:
@@ -21,6 +28,8 @@ def mutated(seed: Seed, rng: random.Random) -> bytes:
         ways += [_edited] * 6
     if seed.content_type == GLB:
         ways += [_binary_only] * 3
+    if seed.content_type in FORMATS.keys() - {GLB, GLTF}:
+        ways += [_reworded] * 4
     return rng.choice(ways)(seed.body, rng)
 
 
@@ -48,6 +57,15 @@ def _doubled(body: bytes, rng: random.Random) -> bytes:
     end = min(len(body), start + rng.choice([1, 4, 64, 1024]))
     byte = rng.randrange(len(body))
     return body[:byte] + body[start:end] + body[byte:]
+
+
+def _reworded(body: bytes, rng: random.Random) -> bytes:
+    """Replace words of a text, or of a binary file's head."""
+    head, rest = (body, b"") if body.isascii() else (body[:400], body[400:])
+    words = head.split(b" ")
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        words[rng.randrange(len(words))] = rng.choice(WORDS)
+    return b" ".join(words) + rest
 
 
 def _binary_only(body: bytes, rng: random.Random) -> bytes:

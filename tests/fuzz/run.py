@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.memory import peak_mib, reset_peak
+from pns_common.errors import MeshError
 from service.bodies.uploads import sent
 from service.errors import ServiceError
-from service.gltf.subdivide import subdivide_gltf
+from service.meshfiles.convert import converted
 from service.options import Limits, Options
 from tests.fuzz.mutate import mutated
 from tests.fuzz.seeds import Seed
@@ -82,9 +83,11 @@ def outcome(seed: Seed, body: bytes, compress: str = "none") -> str:
     options = Options(levels=1, scheme="loop", compress=compress)
     try:
         upload = sent(body, seed.content_type, LIMITS)
-        subdivide_gltf(upload.data, upload.kind, options, None, LIMITS, siblings=upload.siblings)
+        converted(upload.data, upload.kind, "glb", options, None, LIMITS, siblings=upload.siblings)
     except ServiceError as refusal:
         if not 400 <= refusal.status < 500:
             raise
         return refusal.code
+    except MeshError:
+        return "mesh"
     return "refined"

@@ -12,7 +12,9 @@ from pathlib import Path
 import DracoPy
 import meshopt
 import numpy as np
+import trimesh
 
+from service.bodies.media import GLB, GLTF, MEDIA_TYPES
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 
@@ -29,9 +31,6 @@ class Seed:
     body: bytes
 
 
-GLB, GLTF = "model/gltf-binary", "model/gltf+json"
-
-
 def seeds(folder: Path | None) -> list[Seed]:
     """Everything that a run starts from."""
     all_seeds = made()
@@ -45,7 +44,7 @@ def seeds(folder: Path | None) -> list[Seed]:
 def made() -> list[Seed]:
     """Small files for each thing that the reader looks at."""
     trees = {
-        "plain": files.document([box(), octahedron()], [{"POSITION": np.eye(3), "mode": 1}]),
+        "plain": plain(),
         "sparse": sparse(),
         "quantised": quantised(),
         "strip": strip(),
@@ -57,7 +56,37 @@ def made() -> list[Seed]:
         Seed(name, GLB, files.pack(tree, bytes(binary))) for name, (tree, binary) in trees.items()
     ]
     gathered += [Seed(f"{name}.gltf", GLTF, embedded(*trees[name])) for name in trees]
-    return [*gathered, zipped(*trees["plain"]), multipart(*trees["plain"])]
+    return [*gathered, *mesh_files(), zipped(*trees["plain"]), multipart(*trees["plain"])]
+
+
+def mesh_files():
+    """Boxes in the other formats, text and binary, with what these have beside triangles."""
+    solid = trimesh.creation.box()
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in solid.vertices)
+    text += "".join(f"vt {n / 8} 0.5\n" for n in range(8)) + "usemtl a\n"
+    text += "".join("f " + " ".join(f"{v + 1}/{v + 1}" for v in f) + "\n" for f in solid.faces)
+    bodies = {
+        "obj": ("obj", f"# box\no part\n{text}f -4 -3 -2 -1\n".encode()),
+        "off": ("off", solid.export(file_type="off").encode() + b"\n"),
+        "ply": ("ply", bytes(solid.export(file_type="ply"))),
+        "text ply": ("ply", solid.export(file_type="ply", encoding="ascii")),
+        "stl": ("stl", bytes(solid.export(file_type="stl"))),
+        "text stl": ("stl", solid.export(file_type="stl_ascii").encode()),
+    }
+    return [Seed(name, MEDIA_TYPES[kind], body) for name, (kind, body) in bodies.items()]
+
+
+def plain():
+    """Every kind of thing beside geometry that the reader looks at."""
+    tree, binary = files.document([box(), octahedron()], [{"POSITION": np.eye(3), "mode": 1}])
+    tree["nodes"] += [{"children": [0, 1]}, {"mesh": 0, "extras": [1, "two", None]}]
+    tree["scenes"] = [{"nodes": [2, 3]}]
+    tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    tree["textures"], tree["samplers"] = [{"source": 0, "sampler": 0}], [{}]
+    tree["images"] = [{"bufferView": 0, "mimeType": "image/png"}]
+    channel = {"sampler": 0, "target": {"node": 0, "path": "scale"}}
+    tree["animations"] = [{"channels": [channel], "samplers": [{"input": 0, "output": 1}]}]
+    return tree, binary
 
 
 def sparse():

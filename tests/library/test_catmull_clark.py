@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop
-from pns_common.carry.columns import level_topologies, refine_columns
+from pns_common.carry.columns import level_topologies
 from pns_common.mesh.quads import split_quads
 from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
@@ -22,11 +22,8 @@ from tests.support.polygons import (
     polygon_soups,
     quad_grid,
     quad_star,
-    quad_torus,
     uneven,
 )
-
-NO_CREASES = np.zeros((0, 2), dtype=int)
 
 
 def slow_step(points, faces, sharpness):
@@ -274,17 +271,6 @@ def test_a_regular_grid_is_the_bicubic_b_spline():
             np.testing.assert_allclose(refined.vertices[6 * i + j], expected, atol=1e-15)
 
 
-@pytest.mark.parametrize("threads", [2, 3])
-def test_threads_change_no_bit(threads):
-    points, faces = quad_torus(96, 64)
-    one, several = (
-        refine(Mesh(points, faces), catmull_clark(), 2, threads=n) for n in (1, threads)
-    )
-    np.testing.assert_array_equal(several.mesh.vertices, one.mesh.vertices)
-    np.testing.assert_array_equal(several.mesh.faces, one.mesh.faces)
-    assert several.report == one.report
-
-
 # --- front doors ----------------------------------------------------------------------------------
 
 
@@ -327,18 +313,3 @@ def test_loop_refuses_polygons_and_says_what_takes_them():
         refine(Mesh(*SHAPES["cube"]), loop(), 1)
     with pytest.raises(MeshError, match="triangles"):
         level_topologies(SHAPES["cube"][1], 8, 1)
-
-
-def test_columns_and_matrix_follow_positions():
-    points, faces = SHAPES["mixed"]
-    points, creases = uneven(points), Creases(np.array([[0, 1], [1, 5]]), levels=2)
-    made = refine(Mesh(points, faces), catmull_clark(), 3, creases=creases)
-    topologies = level_topologies(faces, len(points), 3, creases, CATMULL_CLARK)
-    columns = np.hstack([points, points[:, :2]])
-    refined = refine_columns(columns, topologies, CATMULL_CLARK)
-    np.testing.assert_array_equal(refined[:, :3], made.mesh.vertices)
-    np.testing.assert_array_equal(refined[:, 3:], made.mesh.vertices[:, :2])
-    matrix = subdivision_matrix(made.topologies, CATMULL_CLARK)
-    product = np.zeros(made.mesh.vertices.shape)
-    np.add.at(product, matrix.rows, matrix.weights[:, None] * points[matrix.columns])
-    np.testing.assert_allclose(product, made.mesh.vertices, atol=1e-13)

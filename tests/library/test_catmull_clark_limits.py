@@ -10,7 +10,7 @@ from pns_common.carry.columns import level_topologies, refine_columns
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.schemes import catmull_clark_limit as masks
-from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
+from pns_common.schemes.limit import limit_normals, limit_positions
 from tests.support import opensubdiv
 from tests.support.meshes import bent
 from tests.support.polygons import (
@@ -118,14 +118,6 @@ def test_limits_equal_opensubdivs(name):
     ours = limit.normals[corners]
     shown = known & inside[corners]
     np.testing.assert_allclose(ours[shown], theirs[shown], rtol=0, atol=1e-10)
-
-
-def test_a_crease_moves_limits_as_far_as_is_said():
-    points, faces = SHAPES["cube"]
-    smooth, sharp = Mesh(points, faces).topology(), creased(points, faces, [[0, 1], [1, 5]])
-    assert limit_shift(points, smooth, base=CATMULL_CLARK) == 0.0
-    moved = np.linalg.norm(positions(points, sharp) - positions(points, smooth), axis=1)
-    assert limit_shift(points, sharp, base=CATMULL_CLARK) == pytest.approx(moved.max())
 
 
 # --- normals --------------------------------------------------------------------------------------

@@ -7,18 +7,15 @@ from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns
 from pns_common.carry.columns import (
-    ColumnRefinement,
     level_topologies,
     refine_columns,
 )
-from pns_common.mesh.topology import build_topology
 from pns_common.operator.scheme import catmull_clark
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
-from pns_common.schemes.limit import limit_positions
 from pns_common.schemes.matrix import subdivision_matrix
 from tests.support.control_points import refine
-from tests.support.meshes import bent, bumpy_sphere, grid, manifolds, soups
+from tests.support.meshes import bent, grid, manifolds, soups
 
 
 @pytest.mark.parametrize("limit", [False, True])
@@ -80,42 +77,6 @@ def test_the_matrix_of_one_level_holds_loops_masks():
     # An interior edge between 1 and 2; the vertex of valence 2 at 0, on the boundary.
     assert matrix[5].tolist() == [1 / 8, 3 / 8, 3 / 8, 1 / 8]
     assert matrix[0].tolist() == [3 / 4, 1 / 8, 1 / 8, 0]
-
-
-def test_vertices_without_faces_stay():
-    points, faces = bumpy_sphere()
-    topologies = level_topologies(faces, len(points) + 1, 1)
-    columns = np.vstack([points, [[9.0, 9, 9]]])
-    assert refine_columns(columns, topologies)[len(points)].tolist() == [9, 9, 9]
-    row = loop().matrix(Mesh(columns, faces))[[len(points)]]
-    assert (row.indices.tolist(), row.data.tolist()) == ([len(points)], [1])
-
-
-def test_one_map_serves_many_columns():
-    points, faces = bumpy_sphere()
-    topologies = level_topologies(faces, len(points), 2)
-    linear = ColumnRefinement(topologies, limit=True)
-    assert linear.count == len(linear(points)) == linear.last.vertex_count
-    refined = refine_columns(points, topologies)
-    np.testing.assert_array_equal(linear(points), limit_positions(refined, linear.last))
-    halves = [linear(points[:, :1]), linear(points[:, 1:])]
-    np.testing.assert_array_equal(np.hstack(halves), linear(points))
-    assert linear(np.zeros((len(points), 0))).shape == (linear.count, 0)
-
-
-def test_whole_numbers_are_refined_as_floats():
-    topologies = level_topologies(np.array([[0, 1, 2]]), 3, 1)
-    made = refine_columns(np.array([[1], [2], [4]]), topologies)
-    np.testing.assert_array_equal(made[3:, 0], [1.5, 3, 2.5])
-
-
-def test_topologies_are_those_of_the_refined_faces():
-    faces = np.random.default_rng(0).integers(0, 9, (20, 3))
-    first, second = level_topologies(faces, 9, 2)
-    made = refine(Mesh(np.random.default_rng(0).standard_normal((9, 3)), faces), loop(), 1)
-    np.testing.assert_array_equal(second.faces, made.mesh.faces)
-    np.testing.assert_array_equal(first.edges, build_topology(faces, 9).edges)
-    assert level_topologies(faces, 9, 0) == []
 
 
 @pytest.mark.parametrize("rows", [2, 4])

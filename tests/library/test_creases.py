@@ -9,7 +9,7 @@ from pns_common import Creases, Mesh, ParameterError, load_model, loop, pns, ref
 from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
-from tests.support.meshes import bumpy_sphere, grid, manifolds, prism, soups
+from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
 
 seeds = st.integers(0, 2**31)
 
@@ -122,14 +122,6 @@ def test_sharp_edges_do_not_depend_on_numbering(mesh, seed):
 def test_creases_that_are_no_edges_are_refused_by_name(creases, name):
     with pytest.raises((ParameterError, TypeError), match=name):
         refine(Mesh(*grid(3)), loop(), creases=creases)
-
-
-def test_a_prism_keeps_its_rims():
-    turns = np.arange(12) * np.pi / 6
-    mesh = prism(np.stack([np.cos(turns), np.sin(turns)], axis=1))
-    found = sharp_edges(mesh)
-    heights = mesh.vertices[found][:, :, 2]
-    assert (heights[:, 0] == heights[:, 1]).sum() == 24
 
 
 def border_points(mesh, border, scheme):

@@ -59,12 +59,6 @@ def test_pieces_are_convex_and_keep_area_and_corners(name, shift):
     assert are_star_shaped(made.vertices, made.offsets, made.corners).all()
 
 
-def test_a_letter_has_as_few_pieces_as_it_can():
-    assert cut_concave(polygon(LETTER_U)).face_count == 3
-    assert cut_concave(polygon(LETTER_L)).face_count == 2
-    assert cut_concave(polygon(DART)).face_count == 2
-
-
 def test_catmull_clark_tiles_a_letter_once_it_is_cut():
     """No quad lies over another: their areas sum up to what the outline encloses."""
 
@@ -98,29 +92,10 @@ def test_polygons_that_are_star_shaped_stay(name):
     assert cut_concave(mesh) is mesh
 
 
-def test_pieces_stand_in_their_polygons_place_and_know_their_corners():
-    points = np.concatenate([in_plane(LETTER_U), [[9, 0, 0]]])
-    mesh = Mesh(points, [[1, 8, 2], [*range(8)], [8, 1, 2]])
-    pieces = convex_pieces(mesh.vertices, mesh.offsets, mesh.corners)
-    made = cut_concave(mesh)
-    np.testing.assert_array_equal(made.corners, mesh.corners[pieces.places])
-    np.testing.assert_array_equal(made.offsets, pieces.offsets)
-    assert pieces.face.tolist() == [0, 1, 1, 1, 2]
-    assert (pieces.cut, pieces.crossed) == (1, 0)
-    of_corner = np.repeat(pieces.face, np.diff(pieces.offsets))
-    first, last = mesh.offsets[of_corner], mesh.offsets[of_corner + 1]
-    assert ((first <= pieces.places) & (pieces.places < last)).all()
-
-
 def test_a_polygon_that_crosses_itself_stays_and_is_counted():
     mesh = polygon([(0, 0), (3, 3), (3, 0), (0, 2)])
     assert cut_concave(mesh) is mesh
     assert convex_pieces(mesh.vertices, mesh.offsets, mesh.corners).crossed == 1
-
-
-def test_polygons_without_area_stay():
-    mesh = polygon([(0, 0), (1, 0), (2, 0), (1, 0)])
-    assert cut_concave(mesh) is mesh
 
 
 @pytest.mark.parametrize("size", [1e-60, 1e74])

@@ -201,7 +201,7 @@ def test_the_number_of_threads_changes_no_bit(base):
 @over_both
 @pytest.mark.parametrize("number", range(3))
 def test_tiles_that_share_a_border_meet(base, number):
-    """Nothing inside moves a border, unless a learned crease runs into it."""
+    """Nothing that is learned inside moves a border."""
     points, faces = grid(7, bent) if base == "loop" else quad_grid(7, bent)
     points[:, 0] += 0.05 * np.sin(5 * points[:, 1]) * (np.abs(points[:, 1]) < 0.9)
     centre = points[faces].mean(axis=1)[:, 0]
@@ -211,7 +211,7 @@ def test_tiles_that_share_a_border_meet(base, number):
     for half in halves:
         used = np.unique(half)
         mesh = Mesh(points[used], np.searchsorted(used, half))
-        refined = refine(mesh, pns(MODELS[base][number]), 2, 1.0, limit=True, creases=None).mesh
+        refined = refine(mesh, pns(MODELS[base][number]), 2, 1.0, creases="auto").mesh
         made.append({tuple(point) for point in refined.vertices.tolist()})
     # The ends of what they share turn otherwise in each, and so do their neighbours' limits.
     assert len(made[0] & made[1]) >= 4 * 4 + 1

@@ -34,8 +34,3 @@ def test_an_error_crosses_to_another_process_with_its_data(name):
     error, text = ERRORS[name]
     copy = pickle.loads(pickle.dumps(error))
     assert (type(copy), str(copy), copy.__dict__) == (type(error), text, error.__dict__)
-
-
-def test_a_wrong_argument_is_a_value_error_to_those_who_know_no_other():
-    with pytest.raises(ValueError, match="levels"):
-        raise ERRORS["parameter"][0]

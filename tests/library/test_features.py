@@ -6,14 +6,7 @@ import pytest
 from pns_common.mesh.topology import build_topology
 from pns_common.model.card import EDGE_FEATURES
 from pns_common.model.features import (
-    EDGE_GROUPS,
     FEATURE_SETS,
-    HALF_TURN,
-    MIRROR,
-    TURN_OVER,
-    Feature,
-    FeatureSet,
-    symmetries,
 )
 from pns_common.operator.formula import PaperRule, edge_inputs
 from pns_common.operator.level import Level
@@ -41,22 +34,6 @@ def test_the_symmetries_are_a_group_of_involutions(name):
             assert tuple(map(tuple, both)) in known
 
 
-def test_a_half_turn_renames_the_ends_and_the_sides():
-    features = [Feature("log", side) for side in ("ac", "bc", "ad", "bd")]
-    features += [Feature("tilt", end, half_turn=-1) for end in "ab"]
-    features += [Feature("span", "cd")]  # of two that change places
-    group = symmetries(features, [HALF_TURN])
-    assert group.order[1].tolist() == [3, 2, 1, 0, 5, 4, 6]
-    assert group.signs[1].tolist() == [1, 1, 1, 1, -1, -1, 1]
-    assert group.local[1].tolist() == [-1, 1, -1]
-
-
-def test_rotations_of_the_frame_keep_its_orientation_and_mirrors_turn_it():
-    assert np.prod(HALF_TURN.local) == 1
-    assert np.prod(TURN_OVER.local) == 1
-    assert np.prod(MIRROR.local) == -1
-
-
 def edges_of(points, faces, name):
     """The stencil's features and frames at every edge of a closed mesh, by its ends."""
     level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
@@ -67,76 +44,6 @@ def edges_of(points, faces, name):
         tuple(key): (phi, basis.reshape(3, 3))
         for key, phi, basis in zip(keys.tolist(), at.features, at.basis, strict=True)
     }
-
-
-# Element i of a group is the product of the generators whose bits i has.
-TURNED_OVER, MIRRORED = 4, 2
-
-
-SIGNED = [name for name, seen in FEATURE_SETS.items() if TURN_OVER in seen.generators]
-
-
-@pytest.mark.parametrize("name", SIGNED)
-def test_faces_turned_over_permute_and_sign_the_features(name):
-    points, faces = bumpy_sphere()
-    seen, turned = edges_of(points, faces, name), edges_of(points, faces[:, ::-1], name)
-    group = FEATURE_SETS[name].symmetries
-    order, signs = group.order[TURNED_OVER], group.signs[TURNED_OVER]
-    for key, (phi, basis) in seen.items():
-        np.testing.assert_allclose(turned[key][0], signs * phi[order], atol=1e-13)
-        expected = group.local[TURNED_OVER][:, None] * basis
-        np.testing.assert_allclose(turned[key][1], expected, atol=1e-13)
-
-
-@pytest.mark.parametrize("name", FEATURE_SETS)
-def test_a_mirror_permutes_and_signs_the_features(name):
-    points, faces = bumpy_sphere()
-    seen = edges_of(points, faces, name)
-    mirrored = edges_of(points * [-1, 1, 1], faces[:, ::-1], name)
-    group = FEATURE_SETS[name].symmetries
-    order, signs = group.order[MIRRORED], group.signs[MIRRORED]
-    for key, (phi, basis) in seen.items():
-        np.testing.assert_allclose(mirrored[key][0], signs * phi[order], atol=1e-13)
-        expected = group.local[MIRRORED][:, None] * basis * [-1, 1, 1]
-        np.testing.assert_allclose(mirrored[key][1], expected, atol=1e-13)
-
-
-@pytest.mark.parametrize("name", FEATURE_SETS)
-def test_other_numbers_of_the_ends_are_a_half_turn(name):
-    points, faces = bumpy_sphere()
-    count = len(points)
-    seen = edges_of(points, faces, name)
-    other = edges_of(points[::-1].copy(), count - 1 - faces, name)
-    group = FEATURE_SETS[name].symmetries
-    for (a, b), (phi, basis) in seen.items():
-        again, frame = other[count - 1 - b, count - 1 - a]
-        np.testing.assert_allclose(again, group.signs[1] * phi[group.order[1]], atol=1e-13)
-        np.testing.assert_allclose(frame, group.local[1][:, None] * basis, atol=1e-13)
-
-
-COMPOSED = [
-    (*EDGE_GROUPS[:2], EDGE_GROUPS[-1]),
-    (EDGE_GROUPS[3],),
-    (EDGE_GROUPS[2], EDGE_GROUPS[0]),
-    EDGE_GROUPS[::-1],
-]
-
-
-@pytest.mark.parametrize("groups", COMPOSED, ids=lambda groups: "-".join(g.name for g in groups))
-def test_a_set_of_any_groups_has_their_columns_and_no_others(groups):
-    """Also where a set is as wide as another one, or narrower than a group of it."""
-    points, faces = bumpy_sphere()
-    level = Level(points, build_topology(faces, len(points)), LOOP, 1.0, Blocks())
-
-    def columns(seen):
-        rule = PaperRule(lambda phi: phi[:, :3], seen, True, 1.0, 1.0)
-        return edge_inputs(level, rule, level.topology.interior).features
-
-    every = FeatureSet("every", EDGE_GROUPS, (HALF_TURN,))
-    whole, of_group = columns(every), dict(zip(EDGE_GROUPS, every.starts, strict=True))
-    places = [of_group[g] + k for g in groups for k in range(len(g.features))]
-    made = columns(FeatureSet("composed", tuple(groups), (HALF_TURN,)))
-    np.testing.assert_array_equal(made, whole[:, places])
 
 
 def test_features_keep_their_limits():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pns_common import kernels
-from pns_common.kernels import connectivity, loop
+from pns_common.kernels import loop
 
 DIGEST = """
 import hashlib
@@ -63,21 +63,6 @@ def test_numba_gives_the_same_bits():
 def test_a_loop_refuses_what_it_was_not_compiled_for(arguments):
     with pytest.raises(TypeError, match=r"^loop\.largest_coordinate is compiled for \['f8_2d, int"):
         loop.largest_coordinate(*arguments)
-
-
-def test_numbers_may_be_numpys():
-    points = np.array([[1.0, -4.0, 2.0]])
-    assert loop.largest_coordinate(points, np.int32(0), np.uint8(1)) == 4.0
-    with pytest.raises(OverflowError):
-        loop.largest_coordinate(points, 0, 2**70)
-
-
-def test_the_loop_of_the_given_dtype_is_called():
-    edges = np.array([[0, 1], [1, 2]], np.uint32)
-    for dtype in (np.int64, np.uint32):
-        counts = np.zeros(3, np.int32)
-        connectivity.count_ends(edges, np.array([0, 1], dtype), counts)
-        assert counts.tolist() == [1, 2, 1]
 
 
 def test_code_of_other_sources_is_not_run(monkeypatch):

@@ -13,8 +13,8 @@ from pns_common.mesh.topology import build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
 from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
-from pns_common.schemes.loop_limit import dart_tangents, dart_weights
-from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, icosphere, manifolds, soups
+from pns_common.schemes.loop_limit import dart_tangents
+from tests.support.meshes import bent, bumpy_sphere, grid, icosphere, manifolds, soups
 
 
 def star(k, closed):
@@ -81,12 +81,6 @@ def test_masks_are_convex(mesh, seed, soft):
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-14)
 
 
-def test_where_two_fans_meet_nothing_moves():
-    points, faces = bow_tie()
-    limit = limit_positions(points, build_topology(faces, len(points)))
-    np.testing.assert_array_equal(limit[0], points[0])
-
-
 @pytest.mark.parametrize("w", [0.0, 0.3, 1.0])
 def test_soft_edges_blend_the_rules(w):
     points, faces = star(6, closed=True)
@@ -123,15 +117,6 @@ def test_limits_do_not_depend_on_threads(mesh, seed):
     many = limit_normals(mesh.vertices, topology, blocks)
     np.testing.assert_array_equal(many.vertices, one.vertices)
     np.testing.assert_array_equal(many.sectors, one.sectors)
-
-
-@pytest.mark.parametrize("k", [1, 2, 3, 6, 50])
-def test_weights_beside_a_dart_solve_their_equations(k):
-    w = np.concatenate([[0], dart_weights(True, k)[1:], [0]])
-    np.testing.assert_allclose(5 * w[1:-1], 8 + w[:-2] + w[2:], atol=1e-13)
-    assert dart_weights(True, k)[0] == pytest.approx((w[1] + w[-2]) / 4 if k > 1 else 0)
-    around = dart_weights(False, k)
-    np.testing.assert_allclose(5 * around, 8 + np.roll(around, 1) + np.roll(around, -1))
 
 
 # --- normals --------------------------------------------------------------------------------------
@@ -219,11 +204,6 @@ def test_a_fold_takes_no_part_in_the_normal_of_a_vertex_with_other_faces():
     np.testing.assert_allclose(normals[0], [0, 0, 1], atol=1e-12)
 
 
-def test_faces_without_area_have_no_normal():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
-    assert not limit_normals(points, build_topology(np.array([[0, 1, 2]]), 3)).vertices.any()
-
-
 @pytest.mark.parametrize("k", [3, 5, 8, 9, 10, 33, 200])
 def test_tangents_of_a_dart_shrink_alike_in_every_step(k):
     even, odd = dart_tangents(k)
@@ -249,29 +229,6 @@ def test_a_vertex_of_a_hundred_thousand_spokes_has_limit_and_normal():
 
 
 # --- sectors --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("creases", "sectors"),
-    [
-        ([], [[0, 1, 2, 3, 4, 5]]),
-        ([1], [[0, 1, 2, 3, 4, 5]]),
-        ([1, 4], [[0, 1, 2], [3, 4, 5]]),
-        ([2, 3, 6], [[1], [2, 3, 4], [5, 0]]),
-    ],
-)
-def test_creases_part_the_faces_around_a_vertex(creases, sectors):
-    topology = creased(star(6, closed=True)[1], 7, [[0, j] for j in creases])
-    around = find_sectors(topology)
-    mine = np.flatnonzero(around.vertex == 0)
-    made = [np.flatnonzero(around.of_corner == s) // 3 for s in mine]
-    assert sorted(map(sorted, (faces.tolist() for faces in made))) == sorted(map(sorted, sectors))
-    # An open sector begins at its first face anticlockwise.
-    if creases:
-        assert {int(f) for f in around.first[mine] // 3} == {faces[0] for faces in sectors}
-        assert (mine < around.opened).all()
-    else:
-        assert (mine >= around.opened).all()
 
 
 @given(st.one_of(manifolds(), soups()))

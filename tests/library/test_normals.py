@@ -1,21 +1,16 @@
 """Normals of groups of corners, the fans that share them, and tangents at right angles to them."""
 
-import math
-
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given
-from hypothesis import strategies as st
 
-from pns_common.kernels.normals import angle_between
 from pns_common.mesh.normals import angle_weighted_normals, perpendicular_tangents, smooth_fans
 from pns_common.mesh.rows import number_by_first_appearance, unit
 from pns_common.parallel import Blocks
-from tests.support.meshes import bow_tie, bumpy_sphere, icosphere, soups
+from tests.support.meshes import bow_tie, bumpy_sphere, soups
 
 BLOCKS = Blocks(threads=2, rows=100)
-SIZES = st.floats(1e-150, 1e150)
 
 
 def test_normals_equal_trimesh_on_a_smooth_surface():
@@ -54,14 +49,6 @@ def test_normals_do_not_depend_on_the_unit_of_length(scale):
     faces = np.array([[0, 1, 2]])
     normals = angle_weighted_normals(points, faces, faces, 3, BLOCKS)
     np.testing.assert_allclose(normals, [[0, 0, 1]] * 3, atol=1e-12)
-
-
-def test_groups_without_area_or_direction_have_none():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
-    # A line; then a face and its own back.
-    for faces in (np.array([[0, 1, 2]]), np.array([[0, 1, 3], [1, 0, 3]])):
-        normals = angle_weighted_normals(points, faces, faces, 4, BLOCKS)
-        np.testing.assert_array_equal(normals, np.zeros((4, 3)))
 
 
 def test_tangents_along_the_normal_are_replaced_by_a_perpendicular():
@@ -103,29 +90,4 @@ def test_a_bow_tie_has_two_fans_where_it_is_pinched():
     assert fans_at(0, *bow_tie()) == 2
 
 
-def test_creases_along_all_edges_leave_each_corner_alone():
-    points, faces = icosphere(0)
-    edges = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
-    fans = smooth_fans(faces, len(points), edges)
-    np.testing.assert_array_equal(fans, np.arange(faces.size).reshape(-1, 3))
-
-
 # --- angles ---------------------------------------------------------------------------------------
-
-
-@given(SIZES, SIZES, st.booleans())
-def test_angles_are_those_of_the_arctangent(sine, cosine, blunt):
-    cosine = -cosine if blunt else cosine
-    expected = math.atan2(sine, cosine)
-    assert angle_between(sine, cosine) == pytest.approx(expected, rel=2.0**-51, abs=0)
-
-
-def test_no_angle_jumps_where_the_formula_changes():
-    angles = np.linspace(0, np.pi, 20_001)
-    made = [angle_between(abs(s), c) for s, c in zip(np.sin(angles), np.cos(angles), strict=True)]
-    np.testing.assert_allclose(made, angles, rtol=1e-15, atol=1e-15)
-
-
-def test_a_sine_of_zero_is_no_angle_or_half_a_turn():
-    given_pairs = [(0.0, 2.0), (0.0, -2.0), (0.0, 0.0), (0.0, -0.0), (1.0, 0.0)]
-    assert [angle_between(*pair) for pair in given_pairs] == [0, math.pi, 0, 0, math.pi / 2]

@@ -1,7 +1,6 @@
 """refine: the report, determinism, and levels that compose."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,23 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pns_common
-from pns_common import Mesh, MeshError, Scheme, loop, parallel, pns, refine, refine_many
+from pns_common import Mesh, MeshError, loop, parallel, pns, refine, refine_many
 from pns_common.mesh.topology import build_topology
-from pns_common.model.session import Model
-from pns_common.schemes import LOOP
 from tests.support.meshes import bent, bow_tie, bumpy_sphere, grid, soups, three_pages
 from tests.support.networks import random_model
 
 MODEL = random_model(0, scale=30.0)
-
-
-def test_a_model_file_keeps_the_model_protocol():
-    assert isinstance(MODEL, Model)
-
-
-def test_default_budget_is_the_models():
-    assert pns(MODEL).budget == MODEL.card.budget
-    assert pns(MODEL, 0.25).budget == 0.25
 
 
 def test_coordinates_that_outgrow_the_operator_are_an_error():
@@ -99,14 +87,6 @@ def test_more_levels_give_a_finer_mesh_of_one_surface():
     coarse = refine(mesh, "pns", 1, creases=None).mesh.vertices
     fine = refine(mesh, "pns", 3, creases=None).mesh.vertices
     np.testing.assert_allclose(fine[: len(coarse)], coarse, rtol=0, atol=1e-12)
-
-
-def test_without_limit_masks_vertices_stay_at_the_last_level():
-    mesh = Mesh(*bumpy_sphere())
-    made = refine(mesh, Scheme("loop", replace(LOOP, limit=None)), 1)
-    assert made.normals is None
-    expected = refine(mesh, loop(), 1, limit=False).mesh.vertices
-    np.testing.assert_array_equal(made.mesh.vertices, expected)
 
 
 def test_many_meshes_are_refined_as_each_alone():

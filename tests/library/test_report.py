@@ -68,22 +68,3 @@ def test_loop_is_at_no_distance_from_itself():
         numbers = [report[k] for k in ("learned_levels", "limit_distance", "limit_distance_bound")]
         assert numbers == [0, 0.0, 0.0]
         assert "displacement_max" not in report["levels"][0]
-
-
-def test_guarded_vertices_are_counted():
-    tame = refine(Mesh(*bumpy_sphere(0, bump=0.01)), pns(default_model(0, 0.0))).report
-    wild = refine(Mesh(*bumpy_sphere(0, bump=0.3)), pns(MODELS[1])).report
-    assert tame["levels"][0]["guarded"] == 0
-    assert wild["levels"][0]["guarded"] > 10
-
-
-@pytest.mark.parametrize("creases", [None, np.array([[7, 8], [8, 9], [9, 10]])])
-@pytest.mark.parametrize("scheme", [loop(), pns(MODELS[0])], ids=["loop", "pns"])
-def test_limit_of_one_level_is_limit_of_the_next(creases, scheme):
-    """Put on the limit surface, vertices stay where they are however deep one goes."""
-    mesh = Mesh(*grid(6, lambda x, y: 0.3 * np.sin(3 * x) * y))
-    shallow, deep = (refine(mesh, scheme, k, limit=True, creases=creases) for k in (1, 3))
-    count = len(shallow.mesh.vertices)
-    np.testing.assert_allclose(deep.mesh.vertices[:count], shallow.mesh.vertices, atol=1e-13)
-    np.testing.assert_allclose(deep.normals[:count], shallow.normals, atol=1e-9)
-    assert refine(mesh, scheme, creases=creases).normals is None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, loop, pns, sharp_edges
+from pns_common import Mesh, pns, sharp_edges
 from pns_common.operator.level import Level
 from pns_common.operator.sharpness import creases_by_name, shares_of_corners, shares_of_edges
 from pns_common.parallel import Blocks
@@ -48,13 +48,6 @@ def test_marks_do_not_change_what_is_learned():
         np.testing.assert_array_equal(shares(same, RULE), shares(level, RULE))
 
 
-def test_sharpness_does_not_depend_on_threads():
-    mesh = Mesh(*bumpy_sphere(subdivisions=5))
-    one, three = (shares_of_edges(level_of(mesh, threads), RULE) for threads in (1, 3))
-    np.testing.assert_array_equal(one, three)
-    assert len(np.unique(one)) > 100
-
-
 def test_hubs_cost_no_square_of_their_valence():
     turns = np.linspace(0, 2 * np.pi, 20_001)[:-1]
     mesh = prism(np.stack([np.cos(turns), np.sin(turns)], axis=1))
@@ -81,9 +74,3 @@ def test_automatic_creases_are_those_of_the_network():
     expected = first.edges[w > 1 / 2]
     found = sharp_edges(mesh, scheme=SCHEME)
     assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, expected.tolist()))
-
-
-def test_a_budget_of_0_is_the_base_scheme_without_sharp_edges():
-    mesh = Mesh(*bumpy_sphere())
-    made = refine(mesh, pns(default_model(), 0), 2).mesh.vertices
-    np.testing.assert_array_equal(made, refine(mesh, loop(), 2).mesh.vertices)

@@ -1,7 +1,5 @@
 """Connectivity: orders, classes, fans and splits, against rules applied one element at a time."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +8,7 @@ from hypothesis import strategies as st
 from pns_common import ParameterError
 from pns_common.mesh.topology import EdgeClass, _sort_edges, build_topology, split_triangles
 from pns_common.parallel import Blocks
-from tests.support.meshes import bow_tie, grid, manifolds, soups, three_pages
+from tests.support.meshes import grid, manifolds, soups
 
 CLASSES = EdgeClass.INTERIOR, EdgeClass.BOUNDARY, EdgeClass.IRREGULAR
 
@@ -88,15 +86,6 @@ def test_a_split_is_the_topology_of_its_faces(mesh, seed):
             assert child.sharpness[row] == wanted
 
 
-@pytest.mark.parametrize(
-    ("shape", "expected"), [(bow_tie, [0]), (three_pages, [0, 1]), (lambda: grid(3), [])]
-)
-def test_vertices_of_several_fans_are_found(shape, expected):
-    points, faces = shape()
-    found = build_topology(faces, len(points)).multi_fan_vertices
-    assert np.flatnonzero(found).tolist() == expected
-
-
 @given(soups() | manifolds())
 def test_fans_are_those_of_a_search_over_shared_edges(mesh):
     topology = build_topology(mesh.faces, len(mesh.vertices))
@@ -128,12 +117,3 @@ def test_pairs_that_are_no_edges_are_refused_by_name():
     for pair, expected in (([0, 10**6], "vertices 0"), ([0, 0], "an edge")):
         with pytest.raises(ParameterError, match=rf"creases\[0\].*{expected}"):
             topology.rows_of(np.array([pair]))
-
-
-def test_euler_holds_for_closed_splits():
-    points, faces = np.eye(4)[:, :3], np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    topology = build_topology(faces, len(points))
-    for _ in range(3):
-        topology = split_triangles(topology, Blocks())
-        assert topology.vertex_count - len(topology.edges) + topology.face_count == 2
-        assert Counter(topology.edge_class.tolist()) == {EdgeClass.INTERIOR: len(topology.edges)}

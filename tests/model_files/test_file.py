@@ -11,7 +11,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from pns_common import ModelError, ParameterError
+from pns_common import ModelError
 from pns_common.model import file as model_file
 from pns_common.model.file import (
     BUNDLED,
@@ -386,11 +386,6 @@ def test_a_file_that_is_not_there_lists_the_bundled_names():
     with pytest.raises(ModelError, match=r"bundled name \(.*paper") as caught:
         load_model("no/such/model.onnx")
     assert caught.value.path == "no/such/model.onnx"
-
-
-def test_a_source_that_is_neither_a_name_nor_a_path_is_refused():
-    with pytest.raises(ParameterError, match="bundled name"):
-        load_model(3)
 
 
 def test_bundled_files_stay_below_half_the_limit_of_a_call(monkeypatch):

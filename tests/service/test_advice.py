@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pns_common import Creases, Mesh, load_model
-from service.advice import NO_BENDS, Bends, advice_on, count_bends
+from service.advice import Bends, advice_on, count_bends
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.convert import as_flags, converted
 from service.options import Limits, Options
@@ -67,10 +67,6 @@ def test_who_says_which_edges_are_sharp_is_not_asked_again(crease):
     assert advice(box(), octahedron(), scheme="auto", crease=crease) == []
 
 
-def test_a_scheme_that_looks_for_no_edges_has_no_doubt():
-    assert advice(box(), octahedron()) == []
-
-
 @pytest.mark.parametrize(
     ("weight", "expected"),
     [(0.0, Bends(12, 0, 12)), (0.5, Bends(12, 12, 12)), (0.51, Bends(12, 12)), (1.0, Bends(12))],
@@ -79,20 +75,6 @@ def test_an_edge_is_undecided_between_a_fifth_and_four_fifths(weight, expected):
     # An octahedron's 12 edges bend by 70.5 degrees.
     mesh = mesh_of(octahedron())
     assert count_bends(mesh, weighted(mesh, weight), AUTO) == [expected]
-
-
-def test_each_part_is_counted_alone():
-    one = mesh_of(octahedron())
-    two = Mesh(
-        np.vstack([one.vertices, one.vertices + 5]),
-        np.vstack([one.faces, one.faces + len(one.vertices)]),
-    )
-    edges = two.topology().edges.astype(np.int64)
-    sharp = (edges < len(one.vertices)).all(axis=1)
-    parts = np.repeat([0, 1], len(one.faces))
-    creases = Creases(edges, sharp.astype(np.float64))
-    # The first keeps all of its edges; that of the second says nothing about it.
-    assert count_bends(two, creases, AUTO, 2, parts) == [Bends(12), Bends(12, 0, 12)]
 
 
 LEVEL = report_of(octahedron())["levels"]
@@ -111,11 +93,6 @@ def test_a_part_that_keeps_no_edge_is_spoken_of_first():
     (line,) = advice_on(LEVEL, Bends(40, 40, 14))
     assert line.startswith("no edge is kept sharp where 14 bend by more than 60 degrees: use")
     assert "crease=angle:40 for flat sides" in line
-
-
-@pytest.mark.parametrize("bends", [NO_BENDS, Bends(12, 9), Bends(100, 49), Bends(40, 0, 9)])
-def test_few_edges_are_no_doubt(bends):
-    assert advice_on(LEVEL, bends) == []
 
 
 def test_triangles_that_share_no_vertex_say_how_to_join_them():

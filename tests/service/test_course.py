@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,20 +30,6 @@ def test_the_share_never_goes_back(shares: list[float]) -> None:
     assert told == [max(shares[: count + 1]) for count in range(len(shares))]
 
 
-def test_rows_are_counted_as_they_are_begun() -> None:
-    told: list[float] = []
-    count = Course(moves=told.append).count(8)
-    for rows in (4, 4, 8):
-        count(rows)
-    assert told == [0.0, 0.5, 1.0]
-
-
-def test_rows_of_nothing_are_no_share() -> None:
-    told: list[float] = []
-    Course(moves=told.append).count(0)(0)
-    assert told == [0.0]
-
-
 def test_many_threads_may_tell() -> None:
     told: list[float] = []
     course = Course(moves=told.append)
@@ -53,23 +38,3 @@ def test_many_threads_may_tell() -> None:
     assert told == sorted(told)
     assert len(told) == 1001
     assert told[-1] == 1
-
-
-def test_a_stage_that_fails_leaves_the_part_around_it() -> None:
-    told: list[float] = []
-    course = Course(moves=told.append)
-    with pytest.raises(ZeroDivisionError), course.stage("refine", 0.5, 0.6):
-        raise ZeroDivisionError
-    course.reach(1.0)
-    assert told == [0.5, 1.0]
-    assert course.seconds == {}
-
-
-def test_seconds_of_a_stage_add_up() -> None:
-    begun: list[str] = []
-    course = Course(begins=begun.append)
-    course.book("read", 1.0)
-    with course.stage("read"):
-        pass
-    assert begun == ["read"]
-    assert course.seconds["read"] >= 1.0

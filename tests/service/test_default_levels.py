@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 
 from pns_common import Mesh, loop, pyvista, refine, subdivide
-from service.http.parameters import Parameters
-from service.options import Options
 from tests.support.meshes import bumpy_sphere
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,10 +23,6 @@ def test_python_refines_by_two_levels(door):
     assert inspect.signature(door).parameters["levels"].default in (None, DEFAULT_LEVELS)
     mesh = Mesh(*bumpy_sphere())
     assert refine(mesh, loop()).mesh.face_count == mesh.face_count * 4**DEFAULT_LEVELS
-
-
-def test_the_command_and_http_refine_as_deep_as_python():
-    assert Options().levels == Parameters().levels == DEFAULT_LEVELS
 
 
 @pytest.mark.parametrize(

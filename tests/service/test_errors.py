@@ -52,30 +52,3 @@ def test_no_error_keeps_more_of_an_upload_than_a_page(error):
         long = kind("x" * 10**6, pointer="/a/" + "b" * 10**6)
     assert len(str(long)) < 10_000
     assert long.pointer in (None, "/a")
-
-
-def test_codes_are_slugs_of_their_own():
-    codes = [type(error).code for error in EXAMPLES]
-    assert len(set(codes)) == len(codes)
-    assert all(code == code.lower().replace(" ", "-") for code in codes)
-
-
-def test_the_text_names_the_place():
-    assert str(errors.GltfError("index 9", pointer="/accessors/3")) == "index 9 (at /accessors/3)"
-
-
-def test_a_limit_allows_what_it_says_and_refuses_one_more():
-    errors.check_limit("faces", 5, 5, "there are 5 faces")
-    with pytest.raises(errors.LimitError) as refusal:
-        errors.check_limit("faces", 6, 5, "there are 6 faces")
-    error = refusal.value
-    assert (error.limit, error.found, error.allowed) == ("faces", 6, 5)
-    assert str(error) == "there are 6 faces, more than 5"
-
-
-def test_a_choice_is_one_of_what_there_is_or_lists_it():
-    errors.check_choice("scheme", "loop", ("pns", "loop"))
-    with pytest.raises(errors.InvalidParameter) as refusal:
-        errors.check_choice("scheme", "Loop", ("pns", "loop"))
-    assert (refusal.value.name, refusal.value.choices) == ("scheme", ("pns", "loop"))
-    assert str(refusal.value) == "scheme must be one of pns, loop"

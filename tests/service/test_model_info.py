@@ -60,17 +60,6 @@ def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None
     assert any(line.startswith(f"{DEFAULT_MODEL} *") for line in lines)
 
 
-def test_what_a_format_adds_is_shown_where_it_is(
-    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
-) -> None:
-    print_model(with_card(vertices, vertex_gate_sharpness=37.5))
-    shown = capsys.readouterr().out
-    for value in ("directed-28", "37.5", "symmetric"):
-        assert value in shown
-    print_model(load_model("paper"))
-    assert "vertex" not in capsys.readouterr().out
-
-
 def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     model = load_model("general")
     print_model(model)
@@ -94,12 +83,3 @@ def test_metrics_are_shown_however_deep_they_lie(
     for title in ("metrics: decimation: mean", "metrics: jump: ridges: worst", "training: stages"):
         assert title in shown
     assert "{" not in shown
-
-
-def test_a_card_without_metrics_is_shown(
-    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
-) -> None:
-    print_model(vertices)
-    shown = capsys.readouterr().out
-    assert vertices.hash[:20] in shown
-    assert "metrics" not in shown

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -32,14 +33,21 @@ def random_network(seed, scale=0.3, *, faces=False):
 
 def directed_bytes(network, card):
     """The file of a network."""
-    parts = [
+    size = 2 * network.width
+    encoder, *rounds, heads = (
         [
             (layer.weight.numpy().T, layer.bias.numpy())
             for layer in part.modules()
             if isinstance(layer, nn.Linear)
         ]
         for part in (network.encoder, *network.rounds, network.heads)
-    ]
+    )
+    parts = [encoder]
+    for (weight, bias), last in rounds:
+        own, leaving, reaching = weight[:size], weight[size : 2 * size], weight[2 * size :]
+        told = np.concatenate([leaving, reaching], axis=1), np.concatenate([bias, 0 * bias])
+        parts += [[told], [(own, None), last]]
+    parts.append(heads)
     return directed_file(parts, card)
 
 

@@ -23,6 +23,7 @@ DEFAULT_CARD = ModelCard(
     fold_angle=40.0,
     sharpness_levels=2,
     width=8,
+    hidden=12,
     rounds=2,
 )
 HIDDEN = 12
@@ -63,7 +64,8 @@ def perceptron_bytes(layers, *, project=True, card=CARD):
 def directed_file(parts, card):
     """A file of format 5: each network reads an input of its own, in the order of `networks`.
 
-    ``parts`` are lists of (weight (in, out), bias) pairs.
+    ``parts`` are lists of (weight (in, out), bias) pairs. A weight of fewer rows than its network
+    has columns takes the others in place of a bias.
     """
     nodes, weights, held = [], {}, networks(card)
     for each, layers in zip(held, parts, strict=True):
@@ -72,9 +74,14 @@ def directed_file(parts, card):
             name, last = f"{each.given}_{number}", number == len(layers) - 1
             made = each.answer if last else f"{name}_sum"
             weights |= {f"{name}_weight": weight, f"{name}_bias": bias}
-            nodes.append(
-                helper.make_node("Gemm", [value, f"{name}_weight", f"{name}_bias"], [made])
-            )
+            if number == 0 and len(weight) < each.columns:
+                weights[f"{name}_bias"] = np.array([len(weight), each.columns - len(weight)])
+                cut = [f"{name}_read", f"{name}_added"]
+                nodes.append(helper.make_node("Split", [value, f"{name}_bias"], cut, axis=1))
+                value, added = cut
+            else:
+                added = f"{name}_bias"
+            nodes.append(helper.make_node("Gemm", [value, f"{name}_weight", added], [made]))
             if not last:
                 value = f"{name}_silu"
                 nodes.append(helper.make_node("Sigmoid", [made], [f"{name}_gate"]))

@@ -205,22 +205,6 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def die_once(died: Path) -> int:
-    """The process's number, of the second that is asked."""
-    if not died.exists():
-        died.touch()
-        die()
-    return os.getpid()
-
-
-def wait_once(began: Path) -> int:
-    """Wait for a long time where nobody has begun before, else the process's number."""
-    if not began.exists():
-        tell(began)
-        time.sleep(600)
-    return os.getpid()
-
-
 def descriptors() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 

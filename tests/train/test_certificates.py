@@ -28,7 +28,6 @@ from train.certificates.double_precision import double_model
 from train.certificates.equivariance import equivariance
 from train.certificates.learned_once import (
     fold_free,
-    largest_turn,
     limit_distance,
     locality,
     neighbour_turns,
@@ -45,7 +44,6 @@ from train.certificates.scaling import (
     proximity_slope,
     regular_smoothness,
 )
-from train.certificates.step import drawn_creases
 from train.certificates.subject import (
     Certificate,
     Subject,
@@ -153,11 +151,6 @@ def test_each_part_of_the_operator_protects_its_theorem(variant, lost, kept):
     assert kept is None or not failed(CERTIFICATES[kept](subject))
 
 
-def test_a_gate_of_order_one_keeps_the_planar_spectrum():
-    """x is of second order in a lift, so this scheme's linearisation is Loop's all the same."""
-    assert not failed(CERTIFICATES["T8"](held(schemes.GATE_OF_ORDER_ONE)))
-
-
 def test_a_frame_fixed_in_the_world_fails_through_a_model_too():
     """The row for single precision allows 1e-6 of the envelope, and no more."""
     model = random_model(0)
@@ -172,14 +165,6 @@ def test_the_operator_holds_a_hostile_model_to_its_budget():
     (certificate,) = CERTIFICATES["T1"](subject_of_model(model, model))
     assert certificate.passed
     assert certificate.value > 0.5
-
-
-def test_budget_zero_is_loop_and_has_no_slope():
-    subject = subject_of_network(random_network(0, 1.0), budget=0.0)
-    assert not failed(CERTIFICATES["T1"](subject))
-    (slope,) = CERTIFICATES["T4"](subject)
-    assert slope.passed
-    assert slope.where == "the scheme is its base on every mesh"
 
 
 def test_lifted_stars_find_an_expanding_scheme():
@@ -202,17 +187,6 @@ def test_plain_loop_agrees_with_the_operators_on_every_kind_of_edge(mesh):
     base, expected = plain_loop(mesh.vertices, mesh.faces), refine(mesh, loop(), 1)
     np.testing.assert_allclose(base.positions, expected.mesh.vertices, atol=1e-15)
     assert len(base.labels) == len(base.reach) == len(base.positions)
-
-
-@pytest.mark.parametrize("body", ROUGH, ids=lambda body: body.name)
-def test_plain_loop_keeps_the_creases_that_the_operator_keeps(body):
-    mesh, creases = body.mesh, drawn_creases(body.mesh, np.random.default_rng(0))
-    base = plain_loop(mesh.vertices, mesh.faces, creases)
-    kept = refine(mesh, loop(), 1, creases=creases)
-    np.testing.assert_allclose(base.positions, kept.mesh.vertices, atol=1e-15)
-    inside, rims = (kept.report["levels"][0]["edges"][kind] for kind in ("crease", "boundary"))
-    assert inside > 0
-    assert np.count_nonzero(base.curve_reach[len(mesh.vertices) :]) == inside + rims
 
 
 # The default's certificates: schemes that correct once, and are Loop afterwards.
@@ -243,23 +217,6 @@ def test_any_weights_pass_what_is_promised_of_correcting_once(certificate, scale
     bodies = CLOSED if certificate is smoothness_class else ROUGH
     result = certificate(default_subject(scale), bodies)
     assert result.passed, (result.value, result.where)
-
-
-def test_mirrors_want_tied_weights():
-    subject = default_subject()
-    assert "equivariance, mirrors" in failed(equivariance(subject, BODIES[:2], 0))
-    assert not failed(affine_reproduction(subject, flat_bodies(0), 0))
-
-
-@pytest.mark.parametrize("theorem", ["T1", "T3", "T4"])
-def test_any_weights_of_the_default_pass_the_theorems(theorem):
-    assert not failed(CERTIFICATES[theorem](default_subject()))
-
-
-def test_the_default_has_loops_planar_spectrum_and_a_kink_is_found_there_too():
-    assert not failed(planar_spectrum(default_subject(0.0), (3, 6)))
-    kinked = replace(default_subject(0.0), exact=schemes.GATE_WITH_A_KINK)
-    assert failed(planar_spectrum(kinked, (3, 6)))
 
 
 def test_a_guard_that_is_looser_than_it_says_is_found():
@@ -302,26 +259,6 @@ def test_a_rule_in_squared_edge_lengths_depends_on_resolution():
     result = resolution_independence(replace(default_subject(), unbounded=pns(model)), BODIES)
     assert not result.passed
     assert result.value > 0.5
-
-
-def test_turns_are_measured_to_the_last_degree():
-    points, faces = icosphere(0)
-    assert largest_turn(faces, points, points) == 0
-    assert largest_turn(faces, points, points * [1, 1, -1]) > 100
-    assert largest_turn(faces, points, np.full_like(points, np.nan)) == 180
-
-
-def test_bodies_are_what_the_theorems_ask_for():
-    for body in FLAT:
-        corners = body.mesh.vertices[body.mesh.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        assert (body.mesh.vertices[:, 2] == 0).all()
-        assert (normal[:, 2] > 0).all() or (normal[:, 2] < 0).all()
-    mesh = bumpy_torus(0)
-    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    assert (count == 2).all()
-    assert (np.bincount(unique.reshape(-1)) == 6).all()
 
 
 def test_real_meshes_are_of_reference_length_one_and_pass(tmp_path):

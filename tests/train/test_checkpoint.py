@@ -46,13 +46,3 @@ def test_other_files_are_refused(tmp_path):
     safetensors.torch.save_file({"x": torch.zeros(1)}, path, {"pns": '{"recipe": 3}'})
     with pytest.raises(ModelError, match="safetensors with a recipe"):
         load_checkpoint(path)
-
-
-def test_weights_of_another_network_are_refused(tmp_path):
-    path = tmp_path / "x"
-    small, large = initial_network(paper()), initial_network(paper_text())
-    save_checkpoint(path, Checkpoint(paper_text(), small, {}, "machine"))
-    with pytest.raises(ModelError, match="safetensors with a recipe"):
-        load_checkpoint(path)
-    save_checkpoint(path, Checkpoint(paper_text(), large, {}, "machine"))
-    assert load_checkpoint(path).recipe == paper_text()

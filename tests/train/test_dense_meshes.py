@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from pns_common import Mesh, MeshError
-from tests.support.meshes import bow_tie, bumpy_sphere, grid, icosphere, one_way_pair, three_pages
+from pns_common import MeshError
+from tests.support.meshes import bumpy_sphere, icosphere
 from train.data.dense_meshes import (
-    asset_files,
     is_manifold,
     largest_part,
     read_mesh,
-    welded,
 )
 from train.data.validation import coarse_mesh, read_shape, validation_meshes
 
@@ -49,35 +47,6 @@ def test_the_largest_part_is_taken(tmp_path):
     assert np.abs(part.vertices).max() < 2
 
 
-def test_parts_of_several_primitives_are_joined(tmp_path):
-    """Materials split a mesh; the halves' common border has the same positions."""
-    vertices, faces = SPHERE
-    upper = vertices[faces].mean(axis=1)[:, 2] > 0
-    path = write(tmp_path / "split.glb", (vertices, faces[upper]), (vertices, faces[~upper]))
-    assert len(largest_part(read_mesh(path)).faces) == len(faces)
-
-
-def test_manifolds_are_told_from_the_rest():
-    assert is_manifold(Mesh(*icosphere()))
-    assert is_manifold(Mesh(*grid()))
-    for shape in (bow_tie(), three_pages(), one_way_pair()):
-        assert not is_manifold(Mesh(*shape))
-    vertices, faces = icosphere()
-    assert not is_manifold(Mesh(np.concatenate([vertices, [[9, 9, 9]]]), faces))
-
-
-def test_parts_are_cut_where_three_faces_meet():
-    assert len(largest_part(Mesh(*three_pages())).faces) == 1
-    assert len(largest_part(Mesh(*bow_tie())).faces) == 1
-
-
-def test_welding_knows_one_zero_and_refuses_nothing_left():
-    joined = welded(Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, 0, 0]], [[0, 1, 2], [3, 2, 1]]))
-    assert len(joined.vertices) == 3
-    with pytest.raises(MeshError):
-        welded(Mesh([[0.0, 0, 0], [0, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
-
-
 @pytest.mark.parametrize("content", [b"", b"PK\3\4", b"no arrays"])
 def test_an_archive_of_arrays_that_is_none_is_told(tmp_path, content):
     path = tmp_path / "mesh.npz"
@@ -87,13 +56,6 @@ def test_an_archive_of_arrays_that_is_none_is_told(tmp_path, content):
     np.savez(path, vertices=SPHERE[0])
     with pytest.raises(MeshError, match="cannot be read"):
         read_mesh(path)
-
-
-def test_a_folder_is_read_by_name_and_not_deeper(tmp_path):
-    (tmp_path / "deeper").mkdir()
-    for name in ("deeper/c.ply", "B.ply", "a.glb", "list.csv"):
-        (tmp_path / name).touch()
-    assert [path.name for path in asset_files(tmp_path)] == ["a.glb", "B.ply"]
 
 
 @pytest.mark.parametrize("content", ["glTF, but no more", "v 0 0 0\n"])

@@ -12,10 +12,12 @@ from pns_common.operator.level import Level
 from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
+from tests.support.networks import DEFAULT_CARD
 from tests.train.test_reference import SEEDS, random_mesh
 from train.connectivity import connect
 from train.directed_rule import DirectedEdges, DirectedRule
 from train.models.directed import DirectedNet
+from train.models.torch_model import answered, layers_of
 from train.reference import Surroundings
 
 
@@ -47,12 +49,13 @@ def network(seed, scale=1.0):
 
 def as_networks(net):
     """Return the parts of a torch network as the library asks for them."""
+    own = layers_of(net, DEFAULT_CARD)
 
-    def rows(part):
-        return lambda features: part(torch.from_numpy(np.asarray(features, float))).numpy()
+    def rows(given):
+        return lambda read: answered(own[given], torch.from_numpy(np.asarray(read, float))).numpy()
 
-    heads = rows(net.heads)
-    return DirectedNetworks(rows(net.encoder), tuple(map(rows, net.rounds)), heads, net.width)
+    rounds = [(rows(f"pooled_{n}"), rows(f"messages_{n}")) for n in (1, 2)]
+    return DirectedNetworks(rows("features"), tuple(rounds), rows("states"), net.width, net.hidden)
 
 
 def test_features_agree(both):

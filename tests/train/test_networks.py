@@ -1,6 +1,5 @@
 """Networks: bounded for any weights, tied or averaged over the symmetries of what they read."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,18 +8,17 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pns_common import Mesh, ParameterError, pns
-from pns_common.model.features import DIRECTED_28, FEATURE_SETS
+from pns_common import Mesh, pns
+from pns_common.model.features import DIRECTED_28
 from tests.support.control_points import refine
 from tests.support.directed import random_network
-from tests.support.meshes import TETRAHEDRON, bumpy_sphere, manifolds
-from tests.support.renumbering import ASSETS, MIRROR, asset, mirrored, renumbered, turned_over
+from tests.support.meshes import bumpy_sphere, manifolds
+from tests.support.renumbering import MIRROR, mirrored, renumbered, turned_over
 from train.certificates.equivariance import well_conditioned
 from train.models.directed import MIRRORED
 from train.models.from_recipe import initial_network
-from train.models.networks import ACTIVATIONS, BoundedNet, unit_correction
-from train.models.recipe import one_step
-from train.models.recipes import general, paper
+from train.models.networks import ACTIVATIONS, BoundedNet
+from train.models.recipes import paper
 from train.models.torch_model import recipe_model
 
 
@@ -42,47 +40,6 @@ def test_output_stays_in_the_ball_for_any_weights(seed, scale, budget, activatio
             layer.weight *= scale
         lengths = torch.linalg.vector_norm(net(features, budget), dim=-1)
     assert (lengths <= budget * (1 + 1e-12)).all()
-
-
-def test_short_outputs_are_only_scaled():
-    net = network()
-    features = torch.zeros(1, 5)
-    z = net.net(features)
-    assert torch.linalg.vector_norm(z) < 1
-    torch.testing.assert_close(net(features, 0.25), 0.25 * z, rtol=0, atol=0)
-
-
-def test_gelu_is_the_exact_one():
-    x = torch.linspace(-6, 6, 101, dtype=torch.float64)
-    expected = [0.5 * v * (1 + math.erf(v / math.sqrt(2))) for v in x.tolist()]
-    np.testing.assert_allclose(ACTIVATIONS["gelu"]()(x), expected, rtol=0, atol=1e-15)
-
-
-def test_weights_come_from_the_given_generator_alone():
-    torch.manual_seed(1)
-    first, state = network(seed=5), torch.get_rng_state()
-    torch.manual_seed(2)
-    second = network(seed=5)
-    for weight, again in zip(first.parameters(), second.parameters(), strict=True):
-        assert torch.equal(weight, again)
-    torch.manual_seed(1)
-    assert torch.equal(torch.get_rng_state(), state)
-
-
-def test_weights_keep_to_torchs_own_initial_range():
-    for layer in network(hidden=(64,)).linear_layers:
-        bound = layer.in_features**-0.5
-        assert 0.9 * bound < layer.weight.abs().max() <= bound
-        assert layer.bias.abs().max() <= bound
-
-
-@pytest.mark.parametrize("own", [torch.float32, torch.float64])
-def test_the_operator_gets_its_own_precision_back(own):
-    net = network().to(own)
-    features = torch.rand(4, 5, dtype=torch.float64)
-    correction = unit_correction(net)(features)
-    assert correction.dtype == torch.float64
-    torch.testing.assert_close(correction, net(features.to(own), 1.0).double(), rtol=0, atol=0)
 
 
 EXACT = 1e-12
@@ -116,16 +73,6 @@ feature_sets = pytest.mark.parametrize("features", ["paper-5", "signed-18"])
 
 
 @feature_sets
-@pytest.mark.parametrize("name", ASSETS)
-def test_numbering_and_mirrors_change_nothing_on_assets(features, name):
-    mesh, subject = asset(name), model(features)
-    assert apart(mesh, renumbered(mesh, 0), subject) < EXACT
-    assert apart(mesh, mirrored(mesh), subject, reflected) < EXACT
-    if features in SIGNED:
-        assert apart(mesh, turned_over(mesh), subject) < EXACT
-
-
-@feature_sets
 @given(mesh=manifolds(), seed=st.integers(0, 2**31))
 def test_numbering_mirrors_and_turning_over_change_nothing_on_any_manifold(features, mesh, seed):
     subject = model(features)
@@ -141,44 +88,6 @@ def test_the_papers_orientation_promises_none_of_this():
     assert apart(mesh, mirrored(mesh), subject, reflected) > 1e-4
 
 
-def test_unsigned_features_cannot_tell_outside_from_inside():
-    """Their group has no turn-over: with it every correction along N would average away."""
-    mesh, subject = Mesh(*bumpy_sphere()), model("paper-5")
-    assert apart(mesh, turned_over(mesh), subject) > 1e-4
-
-
-def test_a_folded_pair_of_faces_is_degenerate_in_both_orientations():
-    folded = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.4, 1, 0]]), TETRAHEDRON[:2])
-    for orientation, moved in (("first-face", True), ("symmetric", False)):
-        refined = refine(folded, pns(model(orientation=orientation)), 1)
-        assert refined.report["levels"][0]["degenerate_frames"] == 1
-        assert (refined.ratio.max() > 0) == moved
-
-
-@feature_sets
-def test_the_network_answers_every_reading_of_an_edge_alike(features):
-    group = FEATURE_SETS[features].symmetries
-    network = model(features).network
-    rows = torch.from_numpy(
-        np.random.default_rng(0).normal(size=(50, network.group.order.shape[1]))
-    )
-    with torch.no_grad():
-        plain = network(rows, 0.5)
-        for order, signs, local in zip(group.order, group.signs, group.local, strict=True):
-            turned = network(rows[:, order] * torch.from_numpy(signs), 0.5)
-            expected = plain * torch.from_numpy(local)
-            torch.testing.assert_close(turned, expected, rtol=0, atol=1e-14)
-    assert torch.linalg.vector_norm(plain, dim=1).max() <= 0.5 * (1 + EXACT)
-    assert torch.linalg.vector_norm(plain, dim=1).max() > 0.1
-
-
-def test_weights_of_both_kinds_of_network_are_the_same():
-    """Averaging adds nothing to a checkpoint."""
-    keys = initial_network(replace(paper(), orientation="symmetric")).state_dict().keys()
-    assert keys == initial_network(paper()).state_dict().keys()
-    assert isinstance(model().network, BoundedNet)
-
-
 def test_the_mirror_exchanges_the_states_of_directed_edges_for_any_weights():
     """Features of the mirrored edge have the other half of each state; answers change signs."""
     group, network = DIRECTED_28.symmetries, random_network(3, 1.0, faces=True)
@@ -191,23 +100,3 @@ def test_the_mirror_exchanges_the_states_of_directed_edges_for_any_weights():
     answers = network.heads(state)
     torch.testing.assert_close(network.heads(twin), answers * signs, rtol=0, atol=1e-12)
     assert answers.abs().max() > 0.1
-
-
-def test_only_what_the_mirror_leaves_is_free():
-    network = random_network(0)
-    free = sum(parameter.numel() for parameter in network.parameters())
-    dense = sum(
-        layer.weight.numel() + layer.bias.numel()
-        for layer in network.modules()
-        if isinstance(layer, torch.nn.Linear)
-    )
-    first, last = network.encoder[0], network.heads
-    # Of the first layer half the rows; of the heads half the columns, and the whole bias.
-    assert free == (dense - last.bias.numel()) // 2 + last.bias.numel()
-    assert first.parametrizations.weight.original.numel() == first.weight.numel() // 2
-
-
-def test_one_step_is_refused_where_a_recipe_trains_on_pairs():
-    assert one_step(paper()).dataset == "ridge-training"
-    with pytest.raises(ParameterError, match="one step"):
-        one_step(general())

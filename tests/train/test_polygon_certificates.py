@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, Scheme, catmull_clark, pns
+from pns_common import Mesh, Scheme, catmull_clark
 from pns_common.schemes import CATMULL_CLARK
 from tests.support.control_points import refine
 from tests.support.directed import directed_model, directed_model_bytes
 from tests.support.networks import default_model
-from tests.support.polygons import SHAPES, quad_star, uneven
-from train.certificates.bodies import polygon_bodies
+from tests.support.polygons import SHAPES, uneven
 from train.certificates.certify import run_steps, scheme_steps
 from train.certificates.double_precision import double_model
 from train.certificates.plain import plain_catmull_clark
@@ -138,19 +137,3 @@ def test_the_oracle_of_certificates_is_catmull_clark(name, creased):
     corners = [np.roll(quads, 1 - c, axis=1)[:, :3] for c in range(4)]
     assert {*map(tuple, np.concatenate(corners).tolist())} == {*map(tuple, base.triangles.tolist())}
     assert len(base.labels) == len(base.reach) == len(base.curve_reach) == len(base.positions)
-
-
-def test_bodies_have_faces_of_many_degrees_and_stars_the_valence_asked_for():
-    bodies = polygon_bodies(0)
-    degrees = {len(face) for body in bodies.shaped for face in body.mesh.polygons}
-    assert {3, 4, 7} <= degrees
-    assert (bodies.regular.topology().valence == 4).all()
-    assert all((body.mesh.vertices[:, 2] == 0).all() for body in bodies.flat)
-    for k in VALENCES:
-        mesh = Mesh(*quad_star(k, 3))
-        valence = mesh.topology().valence
-        assert valence[0] == k
-        assert (valence[1 : 1 + 6 * k] == 4).all()
-        assert len(mesh.faces) == 9 * k
-        assert len(mesh.vertices) == 1 + 12 * k
-    assert pns(TIED).base is CATMULL_CLARK

@@ -6,8 +6,7 @@ import pytest
 import torch
 
 from pns_common import ModelError
-from tests.support.shared import shared_path
-from train.models.published import is_operator, load_published, network_from_state, published_budget
+from train.models.published import load_published, network_from_state
 
 
 def state(widths=(5, 8, 8, 3), seed=0):
@@ -70,19 +69,3 @@ def test_an_empty_folder_and_broken_states_are_refused(tmp_path):
     broken["net.2.weight"] = torch.zeros(3, 3)
     with pytest.raises(ModelError, match="state dictionary"):
         network_from_state("shapes", broken)
-
-
-def test_the_names_tell_budget_and_kind():
-    assert published_budget("pns_sweep_C0.1") == 0.1
-    assert published_budget("pns_sweep_C1.0") == 1.0
-    assert published_budget("pns_saddle") == 0.5
-    assert is_operator("pns_saddle")
-    assert is_operator("ablation_PNS_full_trained")
-    assert not is_operator("ablation_no_h2_scaling")
-    assert not is_operator("unconstrained_foil")
-
-
-def test_the_published_folder_has_thirteen_networks():
-    networks = load_published(shared_path("published"))
-    assert len(networks) == 13
-    assert sum(is_operator(name) for name in networks) == 8

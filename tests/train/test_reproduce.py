@@ -10,16 +10,12 @@ from typer.testing import CliRunner
 import train.experiments.command as command
 import train.run
 from pns_common import MeshError
-from train.data.datasets import DATASETS
 from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
-from train.experiments.harness.laboratory import FULL, SMALL, Laboratory
+from train.experiments.harness.laboratory import SMALL, Laboratory
 from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import content_key, read_record, reproduce
 from train.experiments.harness.style import panels
 from train.experiments.registry import EXPERIMENTS
-from train.models.checkpoint import Checkpoint, save_checkpoint
-from train.models.from_recipe import initial_network
-from train.models.recipes import paper
 
 COLUMNS = (Column("name", "Name"), Column("value", "Value", "+.2f"), Column("paper", "Paper"))
 
@@ -148,34 +144,6 @@ def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
         here, there = (tmp_path / side / "figures" / name for side in "ab")
         assert here.read_bytes() == there.read_bytes()
         assert here.read_bytes().startswith({".png": b"\x89PNG", ".pdf": b"%PDF"}[here.suffix])
-
-
-def test_a_given_checkpoint_is_taken_as_it_is(tmp_path):
-    recipe = replace(paper(seed=7), hidden=(8,))
-    network = initial_network(recipe)
-    save_checkpoint(tmp_path / "paper.safetensors", Checkpoint(recipe, network, {}, "here"))
-    taken = laboratory(tmp_path, checkpoints=tmp_path).network(paper())
-    for ours, given in zip(taken.parameters(), network.parameters(), strict=True):
-        assert ours.equal(given)
-    assert not (tmp_path / "networks").exists()
-
-
-def test_a_trained_network_is_kept_between_runs(tmp_path):
-    seen = []
-    lab = replace(laboratory(tmp_path), progress=lambda *step: seen.append(step))
-    first = lab.network(paper())
-    assert seen == [("training paper", 1, 2), ("training paper", 2, 2)]
-    second = lab.network(paper())
-    assert len(seen) == 2
-    for trained, kept in zip(first.parameters(), second.parameters(), strict=True):
-        assert trained.equal(kept)
-
-
-def test_full_scale_cuts_nothing(tmp_path):
-    lab = laboratory(tmp_path, scale=FULL)
-    for name, make in DATASETS.items():
-        assert len(lab.dataset(name).instances) == len(make().instances)
-    assert len(laboratory(tmp_path).dataset("ridge-held-out").instances) == 2
 
 
 def test_the_command_runs_one_experiment_and_writes_the_page(tmp_path, monkeypatch, experiment):

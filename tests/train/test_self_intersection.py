@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh
-from tests.support.meshes import bumpy_sphere
-from train.data.primitives import icosphere, torus
-from train.metrics.face_boxes import WIDE, face_boxes
+from train.data.primitives import icosphere
+from train.metrics.face_boxes import face_boxes
 from train.metrics.self_intersection import self_intersecting
 
 
@@ -40,50 +39,6 @@ def test_agrees_with_every_pair(seed, noise):
     np.testing.assert_array_equal(self_intersecting(face_boxes(mesh)), by_every_pair(mesh))
 
 
-def test_the_order_of_the_faces_decides_nothing():
-    rng = np.random.default_rng(0)
-    sphere = icosphere(3)
-    vertices = sphere.vertices + 0.05 * rng.normal(size=sphere.vertices.shape)
-    crossing = self_intersecting(face_boxes(Mesh(vertices, sphere.faces)))
-    turned = rng.permutation(len(sphere.faces))
-    again = self_intersecting(face_boxes(Mesh(vertices, sphere.faces[turned])))
-    assert 0 < crossing.sum() < len(crossing)
-    np.testing.assert_array_equal(again, crossing[turned])
-
-
-@pytest.mark.parametrize("mesh", [icosphere(2), torus(12, 8)])
-def test_embedded_meshes_have_none(mesh):
-    assert not self_intersecting(face_boxes(mesh)).any()
-
-
-def test_two_spheres_cut_each_other_in_a_ring():
-    sphere = icosphere(3)
-    moved = np.add(sphere.vertices, [1.0, 0.1, 0.2])
-    both = Mesh(
-        np.concatenate([sphere.vertices, moved]),
-        np.concatenate([sphere.faces, sphere.faces + len(sphere.vertices)]),
-    )
-    crossing = self_intersecting(face_boxes(both))
-    middle = both.vertices[both.faces[crossing]].mean(axis=1)
-    distance = np.linalg.norm(middle - [0.5, 0.05, 0.1], axis=1)
-    radius = np.sqrt(1 - (1 + 0.01 + 0.04) / 4)
-    assert crossing.sum() > 50
-    assert np.abs(distance - radius).max() < 0.2
-
-
-def test_faces_far_larger_than_the_rest_are_found():
-    small = icosphere(2)
-    sheet = np.array([[-50.0, -50, 0.013], [50, -50, 0.013], [0, 90, 0.013]])
-    both = Mesh(
-        np.concatenate([small.vertices, sheet]),
-        np.concatenate([small.faces, [[len(small.vertices) + k for k in range(3)]]]),
-    )
-    crossing = self_intersecting(face_boxes(both))
-    heights = small.vertices[small.faces][:, :, 2] > 0.013
-    np.testing.assert_array_equal(crossing[:-1], heights.any(axis=1) & ~heights.all(axis=1))
-    assert crossing[-1]
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_a_wall_of_rulings_does_not_cross_itself_by_rounding(seed):
     """Along a ruling all faces lie in one plane but for rounding."""
@@ -101,32 +56,3 @@ def test_a_wall_of_rulings_does_not_cross_itself_by_rounding(seed):
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     noise = 1e-11 * np.random.default_rng(seed).normal(size=points.shape)
     assert not self_intersecting(face_boxes(Mesh(points @ turn + noise, faces))).any()
-
-
-@pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 65, 320])
-def test_boxes_hold_their_faces_and_the_boxes_below(count):
-    vertices, faces = bumpy_sphere(subdivisions=2)
-    mesh = Mesh(vertices, faces[:count])
-    for tree in (face_boxes(mesh), face_boxes(Mesh(vertices[::-1], mesh.faces))):
-        np.testing.assert_array_equal(np.sort(tree.order), np.arange(len(mesh.faces)))
-        corners = tree.vertices[tree.faces[tree.order]]
-        np.testing.assert_array_equal(tree.corners, corners)
-        lanes = tree.boxes[tree.last_level :].swapaxes(1, 2).reshape(-1, 6)
-        np.testing.assert_array_equal(lanes[: len(corners), :3], corners.min(axis=1))
-        np.testing.assert_array_equal(lanes[: len(corners), 3:], corners.max(axis=1))
-        assert (lanes[len(corners) :, :3] == np.inf).all()
-        for node in range(1, len(tree.boxes)):
-            above = tree.boxes[(node - 1) // WIDE, :, (node - 1) % WIDE]
-            np.testing.assert_array_equal(above[:3], tree.boxes[node, :3].min(axis=1))
-            np.testing.assert_array_equal(above[3:], tree.boxes[node, 3:].max(axis=1))
-
-
-def test_halves_are_compact():
-    """Of many faces side by side each node of the last level spans a small part."""
-    vertices, faces = bumpy_sphere(subdivisions=4)
-    mixed = np.random.default_rng(0).permutation(len(faces))
-    tree = face_boxes(Mesh(vertices, faces[mixed]))
-    nodes = tree.boxes[tree.last_level :]
-    spans = nodes[:, 3:].max(axis=2) - nodes[:, :3].min(axis=2)
-    whole = np.ptp(vertices, axis=0)
-    assert (spans / whole).max(axis=1).mean() < 4 * (WIDE / len(faces)) ** 0.5

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from OCP.Standard import Standard_ConstructionError, Standard_Failure
 
 from pns_common import Mesh
 from train.connectivity import connect
@@ -12,7 +11,6 @@ from train.data.pairs.machined import true_edges
 from train.data.pairs.references import Pair, Reference, sharp_edges
 from train.data.sharp_labels import coarse_sharp_edges
 from train.metrics.shape import volume
-from train.surfaces import brep
 from train.surfaces.brep import box, chamfered, cut, cylinder, edge_groups, filleted, tessellated
 
 CENTRED = (-1, -1, -1), (1, 1, 1)
@@ -57,20 +55,6 @@ def test_a_fillet_leaves_no_sharp_edge_and_a_chamfer_two():
     expected = 2 * (4 * 1.6 + 2 * np.pi * 0.2)
     rounded = tessellated(filleted(solid, upright, 0.2), 1e-3, 0.1)
     assert length(true_edges(rounded)) == pytest.approx(expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("error", [Standard_Failure, Standard_ConstructionError, RuntimeError])
-def test_a_solid_stays_as_it_is_where_opencascade_cannot_round_it(monkeypatch, error):
-    class Maker:
-        def __init__(self, shape):
-            pass
-
-        def Add(self, size, edge):  # noqa: N802 (as OpenCascade names it)
-            raise error("only 2 faces")
-
-    monkeypatch.setattr(brep, "BRepFilletAPI_MakeFillet", Maker)
-    solid = box((0, 0, 0), (1, 1, 1))
-    assert filleted(solid, edge_groups(solid)[0], 0.1) is solid
 
 
 @pytest.mark.parametrize("known", [True, False])

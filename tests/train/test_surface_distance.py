@@ -6,10 +6,8 @@ import pytest
 from pns_common import Mesh
 from tests.support.meshes import bumpy_sphere, grid, icosphere, rotation
 from train.metrics.surface_distance import (
-    SURFACE_METRICS,
     prepared,
     surface_errors,
-    surface_samples,
 )
 
 
@@ -19,13 +17,6 @@ def errors(true, refined, samples=2000):
 
 def moved(mesh, offset):
     return Mesh(mesh.vertices + np.array(offset), mesh.faces)
-
-
-def test_a_surface_is_no_distance_from_itself():
-    mesh = Mesh(*bumpy_sphere())
-    same = errors(mesh, mesh)
-    for metric in SURFACE_METRICS:
-        assert getattr(same, metric) == pytest.approx(0, abs=1e-6)
 
 
 def test_parallel_planes_are_their_gap_apart():
@@ -77,37 +68,3 @@ def test_errors_do_not_change_with_place_and_size():
         assert getattr(after, metric) * unit == pytest.approx(getattr(before, metric), rel=1e-9)
     # Where the nearest point is on an edge, rounding chooses the face.
     assert after.normal == pytest.approx(before.normal, rel=1e-2)
-
-
-def test_samples_lie_in_their_faces_evenly_by_area():
-    mesh = Mesh(*bumpy_sphere())
-    points, faces = surface_samples(mesh, 5000, np.random.default_rng(0))
-    corners = mesh.vertices[mesh.faces]
-    weights = np.linalg.solve(corners[faces].swapaxes(1, 2), points[..., None])[..., 0]
-    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-9)
-    assert weights.min() > -1e-9
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    counts = np.bincount(faces, minlength=len(corners))
-    # Stratified: a piece that only partly lies in a face may fall on either side of its ends.
-    assert np.abs(counts - 5000 * area / area.sum()).max() < 2
-
-
-def test_samples_are_even_within_a_face():
-    points, _ = surface_samples(
-        Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), 40_000, np.random.default_rng(0)
-    )
-    np.testing.assert_allclose(points.mean(axis=0), [1 / 3, 1 / 3, 0], atol=5e-3)
-    np.testing.assert_allclose(points[:, :2].var(axis=0), 1 / 18, atol=1e-3)
-
-
-def test_faces_without_area_get_no_samples():
-    mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 3], [0, 1, 2], [0, 1, 3]])
-    _, faces = surface_samples(mesh, 200, np.random.default_rng(0))
-    assert (faces == 1).all()
-
-
-def test_the_same_mesh_gives_the_same_samples():
-    mesh = Mesh(*bumpy_sphere())
-    np.testing.assert_array_equal(prepared(mesh, 100).points, prepared(mesh, 100).points)

@@ -30,14 +30,6 @@ def test_no_command_trains_the_default_recipe(tmp_path, monkeypatch):
     assert set(checkpoint.metrics) == {"ridge-held-out"}
 
 
-def test_seed_and_output_can_be_chosen(tmp_path, monkeypatch):
-    monkeypatch.setattr(train.fitting.command, "RECIPES", {"paper": quick_paper})
-    path = tmp_path / "other.safetensors"
-    arguments = ["train", "--recipe", "paper", "--seed", "5", "--output", str(path)]
-    assert CliRunner().invoke(train.run.app, arguments, catch_exceptions=False).exit_code == 0
-    assert load_checkpoint(path).recipe.seed == 5
-
-
 def test_fewer_steps_are_on_the_checkpoint(tmp_path):
     path = tmp_path / "short.safetensors"
     arguments = ["train", "--steps", "1", "--output", str(path)]

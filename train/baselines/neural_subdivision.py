@@ -130,13 +130,13 @@ def fit_networks(
     files = make_pairs(*folders, plan.procedural, recipe.seed, 2, polygons=False)
     kept: dict[TrainingPair, list[Connectivity]] = {}
 
-    def limit_of(pair: TrainingPair) -> Float[Tensor, "M 3"]:
+    def limit_of(pair: TrainingPair) -> tuple[Float[Tensor, "M 3"], Float[Tensor, ""]]:
         if pair not in kept:
             kept[pair] = _levels(pair)
         points = torch.from_numpy(pair.mesh.vertices.copy())
         for mesh in kept[pair]:
             points = torch.cat(networks.placed(points, mesh))
-        return points
+        return points, torch.zeros(())  # no sharpness
 
     with deterministic():
         networks = HalfFlapNets(torch.Generator().manual_seed(recipe.seed))

@@ -44,7 +44,7 @@ def _unasked(rows: np.ndarray) -> np.ndarray:
     raise AssertionError("what surrounds a network is measured without its answers")
 
 
-_NONE = DirectedNetworks(_unasked, (), _unasked, 0)
+_NONE = DirectedNetworks(_unasked, (), _unasked, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,8 +80,10 @@ def fit_to_pairs(
     with deterministic():
         network, pool = initial_directed(recipe), PairPool(files, form, plan)
 
-        def limit_of(pair: TrainingPair) -> Tensor:
-            return pair.control.limit(network).points
+        def limit_of(pair: TrainingPair) -> tuple[Tensor, Tensor]:
+            made = pair.control.limit(network)
+            inside = made.sharpness[pair.control.interior]
+            return made.points, inside.sum() / max(len(inside), 1)
 
         losses = descend(recipe, plan, pool, network, limit_of, on_step)
     return network, losses
@@ -92,12 +94,13 @@ def descend(
     plan: OnPairs,
     pool: PairPool,
     network: nn.Module,
-    limit_of: Callable[[TrainingPair], Tensor],
+    limit_of: Callable[[TrainingPair], tuple[Tensor, Tensor]],
     on_step: Callable[[int, float], None],
 ) -> tuple[float, ...]:
     """Train any network on drawn pairs with Adam; return the loss before each step.
 
-    ``limit_of`` returns the points of a pair's control mesh after two levels, (M, 3).
+    ``limit_of`` returns the points of a pair's control mesh after two levels, (M, 3), and the mean
+    sharpness of its interior edges.
     """
     rng = np.random.default_rng(recipe.seed)
     optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
@@ -110,8 +113,8 @@ def descend(
         total = 0.0
         for _ in range(plan.meshes):
             pair = pool.draw(rng)
-            ratios = pair.ratios(limit_of(pair), rng)
-            loss = pair_loss(plan.weights, ratios) / plan.meshes
+            points, sharpness = limit_of(pair)
+            loss = pair_loss(plan.weights, pair.ratios(points, rng), sharpness) / plan.meshes
             loss.backward()
             total += loss.item()
         torch.nn.utils.clip_grad_norm_(network.parameters(), LONGEST_GRADIENT)
@@ -121,11 +124,12 @@ def descend(
     return tuple(losses)
 
 
-def pair_loss(weights: PairWeights, ratios: Sequence[Float[Tensor, ""]]) -> Float[Tensor, ""]:
-    """Weigh errors over the base scheme's; beyond 1 they grow as a logarithm."""
-    total = torch.zeros((), dtype=torch.float64)
+def pair_loss(
+    weights: PairWeights, ratios: Sequence[Float[Tensor, ""]], sharpness: Float[Tensor, ""]
+) -> Float[Tensor, ""]:
+    """Weigh errors over the base scheme's, which grow as a logarithm beyond 1; and sharpness."""
+    total = weights.sharp * sharpness
     parts = weights.mean, weights.spread, weights.peak, weights.normal
     for weight, ratio in zip(parts, ratios, strict=True):
-        error = torch.where(ratio < 1, ratio, 1 + torch.log(ratio))
-        total = total + weight * (error + weights.worse * torch.relu(error - weights.worse_from))
+        total = total + weight * torch.where(ratio < 1, ratio, 1 + torch.log(ratio))
     return total

@@ -43,17 +43,17 @@ class Spokes:
 
     @classmethod
     def of(cls, directed: Directed, w: Float[Tensor, " E"], corners: Float[Tensor, " V"]) -> Spokes:
-        """Return those of a control mesh."""
+        """Return those of a control mesh; at a border's vertices the border's edges alone."""
         count, first = len(directed.first), directed.first.numpy()
-        weights = w.detach().numpy()
-        order = np.lexsort((-np.concatenate([weights, weights]), first))
+        both = torch.where(directed.beside_border, 0.0, torch.cat([w, w]))
+        order = np.lexsort((-both.detach().numpy(), first))
         centres = first[order]
         rank = np.arange(count) - np.searchsorted(centres, centres)
         table = np.full((directed.vertices, SHARPEST), count)
         kept = rank < SHARPEST
         table[centres[kept], rank[kept]] = order[kept]
         spokes = torch.from_numpy(table)
-        own = torch.cat([w, w, w.new_zeros(1)])[spokes]
+        own = torch.cat([both, w.new_zeros(1)])[spokes]
         around = corners[:, None] + (1 - corners[:, None]) * own
         numbers = torch.where(spokes[:, :2] == count, -1, spokes[:, :2])
         ends = _or_itself(numbers, directed.second[numbers.clamp(min=0)])

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from pns_common.mesh.topology import Topology
@@ -63,6 +63,14 @@ class Directed:
         made = edges.T.reshape(-1), edges[:, ::-1].T.reshape(-1)
         made += np.roll(np.arange(2 * count), count), left
         return cls(*map(torch.from_numpy, made), mesh.vertex_count, mesh.face_count)
+
+    @property
+    def beside_border(self) -> Bool[Tensor, " D"]:
+        """True for edges between two faces that leave a vertex of the border."""
+        open_edges = (self.left == self.faces) | (self.left[self.reverse] == self.faces)
+        border = torch.zeros(self.vertices, dtype=torch.bool)
+        border[self.first[open_edges]] = True
+        return border[self.first] & ~open_edges
 
     def mean(self, values: Float[Tensor, "D K"]) -> Float[Tensor, "V K"]:
         """Return the mean over the edges that leave each vertex; 0 where none does."""

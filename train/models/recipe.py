@@ -67,20 +67,21 @@ class OneStep(msgspec.Struct, frozen=True, tag=True):
 
 @dataclass(frozen=True, slots=True)
 class PairWeights:
-    """Weights of errors over the base scheme's on a pair (train/fitting/training_pair.py).
+    """Weights of what a pair's limit surface is judged by.
+
+    Errors are over the base scheme's (train/fitting/training_pair.py).
 
     Attributes:
         mean, spread, peak: of distances: mean, root mean square, 8-norm.
         normal: mean chord between normals.
-        worse: beside each of these, what is above `worse_from`.
+        sharp: mean sharpness of edges between two faces: what gains nothing stays smooth.
     """
 
     mean: float
     spread: float
     peak: float
     normal: float
-    worse: float
-    worse_from: float
+    sharp: float
 
 
 class OnPairs(msgspec.Struct, frozen=True, tag=True):

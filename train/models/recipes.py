@@ -98,9 +98,7 @@ def general(seed: int = 0) -> Recipe:
         budget=10.0,
         gate_sharpness=1e7,
         training=OnPairs(
-            weights=PairWeights(
-                mean=1.0, spread=0.5, peak=0.4, normal=2.0, worse=0.0, worse_from=0.95
-            ),
+            weights=PairWeights(mean=1.0, spread=0.5, peak=0.4, normal=2.0, sharp=0.2),
             meshes=3,
             real=0.6,
             kinds={

@@ -7,7 +7,7 @@ import numpy as np
 import safetensors.torch
 import torch
 from jaxtyping import Float
-from torch import nn
+from torch import Tensor, nn
 
 from pns_common.model.card import DIRECTED_FORMAT, PAPER_FORMAT, ModelCard
 from pns_common.model.session import networks
@@ -38,13 +38,40 @@ class TorchModel:
         with torch.no_grad():
             if isinstance(self.network, BoundedNet):
                 return self.network(read, budget).numpy()
-            return layers_of(self.network, self.card)[given](read).numpy()
+            return answered(layers_of(self.network, self.card)[given], read).numpy()
 
 
-def layers_of(network: DirectedNet, card: ModelCard) -> dict[str, nn.Module]:
-    """Return the parts of a network of directed edges, by what each reads."""
-    parts: list[nn.Module] = [network.encoder, *network.rounds, network.heads]
+# Weight and bias; without a bias what the weight does not read of a row is added.
+Layer = tuple[Float[Tensor, "A B"], Float[Tensor, " A"] | None]
+
+
+def layers_of(network: DirectedNet, card: ModelCard) -> dict[str, list[Layer]]:
+    """Return the layers of each network of a model file, by what it reads.
+
+    In a round the first layer is linear in what both vertices pooled: that part of it is computed
+    once a vertex, not once an edge.
+    """
+    encoder, *rounds, heads = (
+        [(part.weight, part.bias) for part in module.modules() if isinstance(part, nn.Linear)]
+        for module in (network.encoder, *network.rounds, network.heads)
+    )
+    parts: list[list[Layer]] = [list(encoder)]
+    size = 2 * network.width
+    for (weight, bias), last in rounds:
+        own, leaving, reaching = weight.split(size, dim=1)
+        told = torch.cat([leaving, reaching]), torch.cat([bias, torch.zeros_like(bias)])
+        parts += [[told], [(own, None), last]]
+    parts.append(list(heads))
     return {each.given: part for each, part in zip(networks(card), parts, strict=True)}
+
+
+def answered(layers: list[Layer], rows: Float[Tensor, "N K"]) -> Float[Tensor, "N A"]:
+    """Return what layers answer, with SiLU between them."""
+    for number, (weight, bias) in enumerate(layers):
+        read, more = rows.split([weight.shape[1], rows.shape[1] - weight.shape[1]], dim=1)
+        rows = read @ weight.T + (more if bias is None else bias)
+        rows = rows if number == len(layers) - 1 else nn.functional.silu(rows)
+    return rows
 
 
 def recipe_model(recipe: Recipe, network: BoundedNet | DirectedNet) -> TorchModel:
@@ -57,7 +84,6 @@ def card_of(recipe: Recipe) -> ModelCard:
     rule = {} if recipe.directed is None else asdict(recipe.directed)
     if rule:
         rule["boundary_strength"] = rule.pop("curve_strength")
-        del rule["hidden"]
     own = {
         "features": recipe.features,
         "gate_sharpness": recipe.gate_sharpness,

@@ -13,15 +13,6 @@ def seamed(vertices, faces):
     return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
 
 
-def test_a_mesh_without_equal_positions_is_refined_as_it_is():
-    vertices, faces = bumpy_sphere()
-    refined, refinement = refine_carried(CarriedMesh(vertices, faces), loop(), 2, {})
-    expected = refine(Mesh(vertices, faces), loop(), 2).mesh
-    for mesh in (refined, refinement.mesh):
-        np.testing.assert_array_equal(mesh.vertices, expected.vertices)
-        np.testing.assert_array_equal(mesh.faces, expected.faces)
-
-
 def test_seams_do_not_tear_the_surface():
     vertices, faces = bumpy_sphere()
     whole = refine(Mesh(vertices, faces), loop(), 2).mesh
@@ -59,26 +50,10 @@ def test_creases_name_vertices_of_the_mesh_that_was_given():
     assert refinement.report["levels"] == expected["levels"]
 
 
-def test_a_face_that_joining_makes_degenerate_is_refined_like_others():
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.0]])
-    refined, _ = refine_carried(
-        CarriedMesh(vertices, np.array([[0, 1, 2], [0, 3, 1]])), loop(), 2, {}
-    )
-    assert refined.faces.shape == (32, 3)
-    assert np.isfinite(refined.vertices).all()
-
-
 def test_vertices_are_joined_by_first_appearance_and_minus_zero_is_zero():
     joined, first = join_by_position(np.array([[1.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, -0.0, 0]]))
     assert joined.tolist() == [0, 1, 0, 1]
     assert first.tolist() == [0, 1]
-
-
-def test_isolated_vertices_stay():
-    vertices, faces = bumpy_sphere()
-    lone = np.concatenate([vertices, [[9.0, 9, 9]]])
-    refined, _ = refine_carried(CarriedMesh(lone, faces), loop(), 1, {})
-    assert refined.vertices[len(vertices)].tolist() == [9, 9, 9]
 
 
 @pytest.mark.parametrize("pairs", [[[0, 99]], [[-1, 0]]])

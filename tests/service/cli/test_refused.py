@@ -14,7 +14,7 @@ from service import cli
 from service.cli import commands
 from service.cli.errors import explained
 from service.meshfiles.example import part_glb
-from tests.service.cli.trees import FACES, tree_of, tree_of_bytes
+from tests.service.cli.trees import tree_of_bytes
 
 NAMES = ", ".join(bundled_models(companions=True))
 
@@ -120,13 +120,6 @@ def test_a_limit_names_the_setting_that_raises_it(
     outcome = pns("subdivide", "part.glb", "-o", "out.glb")
     assert outcome.code == 1
     assert f"{setting} allows more" in outcome.err
-
-
-def test_a_file_may_replace_itself_by_force(pns: Any, part_file: Path) -> None:
-    assert (
-        pns("subdivide", str(part_file), "-o", str(part_file), "--levels", "1", "--force").code == 0
-    )
-    assert tree_of(part_file)["asset"]["extras"]["pns"]["totals"]["faces"] == 4 * FACES
 
 
 def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:

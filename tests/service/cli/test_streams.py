@@ -89,10 +89,3 @@ def test_a_url_is_no_path(pns: Any, tmp_path: Path, part_file: Path, command: st
     assert outcome.code == 2
     assert "is a URL" in outcome.err
     assert not (tmp_path / "https:").exists()
-
-
-def test_edges_of_more_than_two_faces_are_reported(pns: Any, tmp_path: Path) -> None:
-    fins = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n"
-    (tmp_path / "fins.obj").write_text(fins)
-    outcome = pns("subdivide", "fins.obj", "-o", "out.obj", *LOOP)
-    assert "1 × non-manifold edge" in outcome.err

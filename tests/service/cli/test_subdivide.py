@@ -32,18 +32,6 @@ def test_example_then_subdivide_as_the_readme_has_it(pns: Any, tmp_path: Path) -
     assert report["totals"]["faces"] == 16 * FACES
 
 
-def test_options_reach_the_operator(pns: Any, tmp_path: Path, part_file: Path) -> None:
-    arguments = "-o out.glb --budget 0.25 --reference-length 2.5"
-    arguments += " --diagnostics full --report r.json"
-    assert pns("subdivide", str(part_file), *arguments.split()).code == 0
-    report = json.loads((tmp_path / "r.json").read_text())
-    assert report["scheme"] == "pns"
-    assert report["budget"] == 0.25
-    assert report["meshes"][0]["reference_length"] == 2.5
-    attributes = tree_of(tmp_path / "out.glb")["meshes"][0]["primitives"][0]["attributes"]
-    assert "_PNS_RATIO" in attributes
-
-
 def test_materials_and_textures_follow_a_result_and_replace_nothing(
     pns: Any, tmp_path: Path
 ) -> None:
@@ -207,27 +195,6 @@ def test_texture_coordinates_keep_their_direction(pns: Any, tmp_path: Path) -> N
             low = last.vertices[last.corners[np.isclose(uv.values[uv.rows, 1], 0, atol=1e-6)]]
             np.testing.assert_allclose(np.hypot(low[:, 0], low[:, 2]), 0.40, atol=0.03)
             np.testing.assert_allclose(low[:, 1], -0.3, atol=0.06)
-
-
-def test_nodes_are_flattened_into_world_space(pns: Any, tmp_path: Path) -> None:
-    tree = tree_of_bytes(part_glb())
-    tree["nodes"] = [
-        {"children": [1, 2], "translation": [10, 0, 0]},
-        {"mesh": 0, "scale": [2, 2, 2], "rotation": [0, 0, 2**-0.5, 2**-0.5]},
-        {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 5, 0, 1]},
-        {"mesh": 0},
-    ]
-    (tmp_path / "in.glb").write_bytes(with_tree(part_glb(), tree))
-    assert pns("subdivide", "in.glb", "-o", "out.stl", *ONCE).code == 0
-    flattened = pns("subdivide", "in.glb", "-o", "one.stl", *ONCE)
-    assert "nodes joined" in flattened.err
-    mesh = trimesh.load_mesh(tmp_path / "out.stl")
-    # The scene shows the first root alone; the second instance is mirrored, not inside out.
-    theirs = trimesh.load_scene(tmp_path / "in.glb", process=False).to_mesh()
-    assert len(mesh.faces) == 2 * 4 * FACES
-    np.testing.assert_allclose(mesh.bounds, theirs.bounds, atol=0.2)
-    assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(abs(theirs.volume), rel=0.1)
 
 
 def with_tree(glb: bytes, tree: dict[str, Any]) -> bytes:

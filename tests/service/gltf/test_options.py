@@ -6,14 +6,9 @@ import pytest
 from pns_common import load_model
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
+from tests.service.gltf.subdivided import subdivide
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
-from tests.support.networks import random_model
-
-
-def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", "levels": 1, **options})
-    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 
 def cylinder(sides=8):
@@ -50,23 +45,6 @@ def test_creases_of_a_prism_keep_its_ends_flat(crease, scheme):
         ends = attributes["POSITION"][faces[16 * 16 :]]
         assert (np.abs(ends[..., 2]) == 1).all() == flat
     assert "crease" not in subdivide([cylinder()]).report["levels"][0]["edges"]
-
-
-def test_every_edge_of_a_cube_is_a_crease_and_its_corners_stay():
-    for crease in ("normals", "angle:89"):
-        result = subdivide([box()], crease=crease, scheme="pns", levels=3)
-        assert result.report["levels"][0]["edges"] == {
-            "interior": 6,
-            "boundary": 0,
-            "irregular": 0,
-            "crease": 12,
-        }
-        _, attributes = files.primitive_of(result.glb)
-        # A cube refines to itself: three creases make a corner, and the sides are flat.
-        assert np.abs(attributes["POSITION"]).max(axis=1).tolist() == [1] * len(
-            attributes["POSITION"]
-        )
-    assert "crease" not in subdivide([box()], crease="angle:91").report["levels"][0]["edges"]
 
 
 @pytest.mark.parametrize(
@@ -129,29 +107,6 @@ def test_creases_cross_primitives():
     assert report["levels"][0]["edges"]["crease"] == 16
 
 
-def flat_grid(n=5):
-    """A flat patch whose UVs are its coordinates, but for one vertex in the middle."""
-    x, y = np.meshgrid(np.arange(float(n)), np.arange(n), indexing="ij")
-    uv = np.stack([x, y], axis=-1).reshape(-1, 2)
-    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1, 1)
-    faces = np.concatenate([np.add(corner, [0, n, n + 1]), np.add(corner, [0, n + 1, 1])])
-    points = np.column_stack([uv, np.zeros(n * n)])
-    return {"POSITION": points, "TEXCOORD_0": uv.copy(), "indices": faces}
-
-
-@pytest.mark.parametrize("levels", [1, 2, 3])
-def test_smooth_uvs_are_refined_as_positions_are_inside_a_chart(levels):
-    rng = np.random.default_rng(0)
-    shape = octahedron()
-    shape["TEXCOORD_0"] = rng.random((6, 2))
-    shape["POSITION"] = np.column_stack([shape["TEXCOORD_0"], rng.random(6)])
-    _, attributes = files.primitive_of(subdivide([shape], uv="smooth", levels=levels).glb)
-    # One closed chart: the same stencils move both.
-    np.testing.assert_allclose(attributes["TEXCOORD_0"], attributes["POSITION"][:, :2], atol=1e-6)
-    _, linear = files.primitive_of(subdivide([shape], levels=levels).glb)
-    assert np.abs(linear["TEXCOORD_0"] - attributes["TEXCOORD_0"]).max() > 0.01
-
-
 @pytest.mark.parametrize("meshes", [1, 3])
 @pytest.mark.parametrize("levels", [1, 3])
 @pytest.mark.parametrize("crease", ["normals", "angle:60"])
@@ -167,32 +122,6 @@ def test_smooth_uvs_have_the_creases_of_the_positions(crease, levels, meshes):
         np.testing.assert_allclose(
             attributes["TEXCOORD_0"], attributes["POSITION"][:, 1:], atol=1e-6
         )
-
-
-@pytest.mark.parametrize("levels", [1, 2])
-def test_smooth_uvs_leave_seams_and_rims_linear(levels):
-    # On each side of a box, a chart of two faces, every vertex lies on the rim.
-    results = [
-        files.primitive_of(subdivide([box()], uv=rule, levels=levels).glb)
-        for rule in ("smooth", "linear")
-    ]
-    seam = np.isin(results[1][1]["TEXCOORD_0"], [0, 1]).any(axis=1)
-    np.testing.assert_array_equal(
-        results[0][1]["TEXCOORD_0"][seam], results[1][1]["TEXCOORD_0"][seam]
-    )
-    # A flat chart that is a regular grid is reproduced, its rim included.
-    smooth, linear = (
-        files.primitive_of(subdivide([flat_grid()], uv=rule, levels=levels).glb)[1]["TEXCOORD_0"]
-        for rule in ("smooth", "linear")
-    )
-    on_rim = (linear == 0).any(axis=1) | (linear == 4).any(axis=1)
-    np.testing.assert_array_equal(smooth[on_rim], linear[on_rim])
-
-
-def test_smooth_uvs_keep_the_type_of_fractions():
-    uv = files.Normalized(np.random.default_rng(0).integers(0, 65536, (6, 2), dtype=np.uint16))
-    _, attributes = files.primitive_of(subdivide([octahedron(TEXCOORD_1=uv)], uv="smooth").glb)
-    assert attributes["TEXCOORD_1"].dtype in (np.uint16, np.float32)
 
 
 def test_a_weld_tolerance_closes_what_does_not_quite_meet():

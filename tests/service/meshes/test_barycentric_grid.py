@@ -9,35 +9,6 @@ from service.meshes.barycentric_grid import barycentric_grid
 from service.meshes.split_connectivity import split_connectivity
 
 
-@pytest.mark.parametrize("levels", range(1, 7))
-def test_points_are_all_barycentric_points_once(levels):
-    grid, n = barycentric_grid(levels), 2**levels
-    expected = {(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)}
-    assert {tuple(point) for point in grid.points.tolist()} == expected
-    assert len(grid.points) == len(expected)
-    assert grid.faces.shape == (4**levels, 3)
-    np.testing.assert_array_equal(grid.faces.reshape(-1)[grid.slot], np.arange(len(grid.points)))
-    assert sorted([0, 1, 2, *grid.sides.reshape(-1), *grid.inner]) == list(range(len(expected)))
-
-
-@pytest.mark.parametrize("levels", [1, 2, 3])
-def test_sides_run_from_corner_to_corner(levels):
-    grid, n = barycentric_grid(levels), 2**levels
-    for side in range(3):
-        start, end = grid.points[[side, (side + 1) % 3]]
-        for step, point in enumerate(grid.sides[side], start=1):
-            np.testing.assert_array_equal(grid.points[point] * n, start * (n - step) + end * step)
-
-
-@pytest.mark.parametrize("levels", [1, 2, 3])
-def test_reordered_corners_name_the_same_points(levels):
-    grid = barycentric_grid(levels)
-    corners = np.random.default_rng(0).standard_normal((3, 3))
-    for i, j, k in [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)]:
-        mine, other = grid.points @ corners[[i, j, k]], grid.points @ corners
-        np.testing.assert_allclose(mine, other[grid.reorder[3 * i + j]], atol=1e-12)
-
-
 def level_by_level(faces, values, levels):
     """Corner positions of all refined faces, by splitting one level after the other."""
     for _ in range(levels):

@@ -171,16 +171,6 @@ def test_a_cube_is_read_however_it_is_written(name: str) -> None:
         assert refined(data, kind, target).report["totals"]["faces"] == 48
 
 
-AREAS = {"concave_ngon_obj.obj": 30, "concave_ngon_ply.ply": 30, "dart_quad.obj": 0.5}
-
-
-@pytest.mark.parametrize("name", AREAS)
-def test_the_collections_concave_polygons_keep_their_area(name: str) -> None:
-    path = shared_path("cases") / name
-    mesh = formats.read(path.read_bytes(), path.suffix[1:])
-    assert area(mesh) == pytest.approx(AREAS[name], rel=1e-9)
-
-
 @pytest.mark.parametrize(
     "name",
     [

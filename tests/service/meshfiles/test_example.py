@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 
-import numpy as np
 import trimesh
 
 from pns_common.mesh.topology import EdgeClass, build_topology
@@ -20,15 +19,6 @@ def test_a_closed_manifold_of_genus_one_facing_outwards() -> None:
     assert len(welded.points) - len(topology.edges) + len(welded.faces) == 0
     assert 1000 <= len(welded.faces) <= 2000
     assert trimesh.Trimesh(welded.points, welded.faces, process=False).volume > 0
-
-
-def test_texture_coordinates_fill_the_unit_square_once() -> None:
-    triangles = part()
-    assert triangles.layers["TEXCOORD_0"].values is not None
-    a, b, c = triangles.layers["TEXCOORD_0"].values[triangles.faces].transpose(1, 0, 2)
-    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
-    assert (area > 0).all() or (area < 0).all()
-    np.testing.assert_allclose(abs(area.sum()), 1, atol=1e-12)
 
 
 def test_the_file_is_the_same_each_time_and_has_normals_uvs_and_a_material() -> None:

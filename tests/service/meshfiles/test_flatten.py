@@ -12,34 +12,12 @@ from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import octahedron
 
 
-def test_a_mesh_stands_where_its_nodes_put_it():
-    tree, binary = files.document([octahedron()])
-    tree["nodes"] = [{"children": [1], "scale": [2, 2, 2]}, {"mesh": 0, "translation": [1, 0, 0]}]
-    tree["scenes"][0]["nodes"] = [0]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    own = 2 * (octahedron()["POSITION"] + [1, 0, 0])
-    assert len(flat.faces) == len(np.asarray(octahedron()["indices"]).reshape(-1, 3))
-    for axis in range(3):
-        extent = (flat.vertices[:, axis].min(), flat.vertices[:, axis].max())
-        assert extent == pytest.approx((own[:, axis].min(), own[:, axis].max()), abs=1e-6)
-
-
 def test_a_scene_that_shows_no_triangles_is_told():
     tree, binary = files.document([octahedron()])
     tree["scenes"].append({"nodes": []})
     tree["scene"] = 1
     with pytest.raises(UnrefinableError, match="shows no triangles"):
         flatten(files.pack(tree, binary), "obj", Limits())
-
-
-def test_without_scenes_children_still_stand_where_their_parents_do():
-    tree, binary = files.document([octahedron()])
-    del tree["scenes"], tree["scene"]
-    tree["nodes"] = [{"mesh": 0}, {"children": [0], "translation": [5, 0, 0]}]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    assert len(flat.faces) == 8
-    assert flat.vertices[:, 0].min() == pytest.approx(4)
-    assert flat.vertices[:, 0].max() == pytest.approx(6)
 
 
 def test_morph_targets_that_are_lost_are_told():
@@ -180,17 +158,6 @@ def test_hidden_nodes_and_what_is_below_them_are_left_out_and_told():
     tree["scenes"][0]["nodes"] = [0]
     with pytest.raises(UnrefinableError, match="shows no triangles"):
         flatten(files.pack(tree, binary), "obj", Limits())
-
-
-def test_joints_of_a_hidden_skeleton_move_what_is_shown():
-    rig = {"JOINTS_0": np.zeros((6, 4), np.uint8), "WEIGHTS_0": np.eye(4)[np.zeros(6, int)]}
-    tree, binary = files.document([octahedron() | rig])
-    tree["skins"] = [{"joints": [1]}]
-    bone = {"translation": [5, 0, 0], "extensions": {"KHR_node_visibility": {"visible": False}}}
-    tree["nodes"] = [{"mesh": 0, "skin": 0}, bone]
-    tree["scenes"][0]["nodes"] = [0, 1]
-    flat, _ = flatten(files.pack(tree, binary), "obj", Limits())
-    assert flat.vertices[:, 0].min() == pytest.approx(4)
 
 
 @pytest.mark.parametrize("weld", ["position", "index"])

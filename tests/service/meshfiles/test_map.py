@@ -111,17 +111,6 @@ def test_maps_of_assets_make_their_positions(name: str, tmp_path: Path) -> None:
     assert assert_map_of_gltf(data, made, parents)
 
 
-def test_of_chosen_materials_the_others_keep_their_vertices(tmp_path: Path) -> None:
-    tree, binary = files.document(halves())
-    tree["materials"] = [{"name": "red"}, {"name": "blue"}]
-    for number, primitive in enumerate(tree["meshes"][0]["primitives"]):
-        primitive["material"] = number // 2
-    data = files.pack(tree, bytes(binary))
-    (tmp_path / "in.glb").write_bytes(data)
-    made, parents = mapped(tmp_path / "in.glb", "glb", material="blue")
-    assert assert_map_of_gltf(data, made, parents) == 2
-
-
 @pytest.mark.parametrize(
     ("output", "options"), [("out.obj", {}), ("out.glb", {"compress": "draco"})]
 )

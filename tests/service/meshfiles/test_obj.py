@@ -7,9 +7,8 @@ from service.errors import UnreadableError, UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.convert import converted
 from service.meshfiles.mesh_file import MATERIAL, NORMAL, UV
-from service.meshfiles.obj import read_obj, write_obj
+from service.meshfiles.obj import read_obj
 from service.meshfiles.parts import chosen_of
-from service.meshfiles.text import whole_rows
 from service.options import Limits, Options
 from tests.support.gltf import files
 
@@ -71,43 +70,6 @@ def test_faces_stay_in_their_order_whatever_divides_them(corner):
     assert triangles(text) == faces
 
 
-def test_texture_coordinates_count_back_from_their_own_face_too():
-    text = "".join(
-        f"v {x} 0 0\nv {x} 1 0\nv {x} 0 1\nvt 0 {x}\nvt 1 {x}\nvt 2 {x}\nf -3/-3 -2/-2 -1/-1\n"
-        for x in (0, 5)
-    )
-    mesh = formats.read(text.encode(), "obj")
-    uv = mesh.layers[UV].values[mesh.layers[UV].rows].reshape(-1, 3, 2)
-    np.testing.assert_array_equal(uv[:, :, 1], [[0] * 3, [5] * 3])
-    np.testing.assert_array_equal(mesh.vertices[mesh.faces][:, :, 0], [[0] * 3, [5] * 3])
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (POSITIONS + "f 0 1 2\n", "line 7 of the OBJ file: a face names vertex 0"),
-        (POSITIONS + "\nf 1 2 7\n", "line 8 .* vertex 7, and there are 6"),
-        ("v 0 0 0\nf 1 -2 1\n" + POSITIONS, "line 2 .* vertex -2, and there are 1"),
-        (POSITIONS + "f 1 2 \\\n x\n", "line 7 .* 'x' is no number"),
-        (POSITIONS + "f 1 2 \\\n x\\", "line 7 .* 'x' is no number"),
-        (POSITIONS.replace("2 2 1", "2 2") + "f 1 2 3\n", "line 5 .* a vertex has 2 coordinates"),
-        (
-            POSITIONS.replace("2 2 1", "2,5 2,5 1") + "f 1 2 5\n",
-            "line 5 .* '2,5' is no number",
-        ),
-        (POSITIONS + "f 1 1_0 2\n", "line 7 .* '1_0' is no number"),
-        (POSITIONS + "vt 0 0\nf 1/1 2/1_0 3/1\n", "line 8 .* '2/1_0' is no corner of a face"),
-        (POSITIONS.replace("2 2 1", "2_2 2 1") + "f 1 2 5\n", "line 5 .* is no number"),
-        (POSITIONS + "f 1.0 2 3\n", "line 7 .* '1.0' is no number"),
-        ((POSITIONS + "f 1 2 7\n").replace("\n", "\r"), "line 7 .* vertex 7, and there are 6"),
-        (POSITIONS + "f 1 2\nf 2 3\n", "the OBJ file has no faces"),
-    ],
-)
-def test_what_is_wrong_is_named_with_its_line(text, words):
-    with pytest.raises(UnreadableError, match=words):
-        formats.read(text.encode(), "obj")
-
-
 def test_a_name_may_have_a_sign_that_begins_a_comment_elsewhere():
     names = ["Wood#1", "Material #2", "red # a comment", "#4", "two words"]
     text = POSITIONS + "".join(f"usemtl {name}\nf 1 2 3\n" for name in names)
@@ -137,17 +99,6 @@ def test_corners_that_name_what_is_not_there_are_reported():
     }
 
 
-def test_an_off_may_begin_with_a_mark_of_its_encoding():
-    data = b"\xef\xbb\xbfOFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
-    assert len(formats.read(data, "off").faces) == 1
-
-
-def test_an_object_is_named_before_its_vertices():
-    text = write_obj(read_obj(b"v 0 0 0\nv 1 0 0\nv 0 1 0\no Cube\nf 1 2 3\n")).decode()
-    assert text.splitlines()[0] == "o Cube"
-    assert text.count("o Cube") == 1
-
-
 @pytest.mark.parametrize("words", ["vt .5 .25\nf 1/1 2/1 3/1\n", "vn 0 0 1\nf 1//1 2//1 3//1\n"])
 def test_corners_without_values_take_nobody_elses_away(words):
     data = (POSITIONS.replace("2 2 1", "2 0 .5")[:-8] + words + "f 1 3 4\nf 2 5 3\n").encode()
@@ -165,23 +116,6 @@ def test_corners_without_values_take_nobody_elses_away(words):
     }
     assert counts == {True: 12, False: 24}
     assert glb.report["changes"] == []
-
-
-def test_quads_without_texture_coordinates_leave_no_value_behind():
-    text = POSITIONS.replace("2 2 1", "2 0 .5").replace("3 3 3", "2 1 .5")
-    data = (text + "vt .5 .25\nf 1/1 2/1 3/1 4/1\nf 2 5 6 3\n").encode()
-    options = Options(levels=1, scheme="catmull-clark")
-    layer = read_obj(converted(data, "obj", "obj", options, None, Limits()).content).layers[UV]
-    assert (layer.rows < 0).reshape(-1, 4).all(axis=1).tolist() == [False] * 4 + [True] * 4
-    assert np.unique(layer.rows).tolist() == [-1, *range(len(layer.values))]
-
-
-@pytest.mark.parametrize("largest", [1, 9, 10, 99_999, 4_294_967_296])
-def test_rows_of_whole_numbers_are_written_as_python_writes_them(largest):
-    numbers = np.random.default_rng(0).integers(0, largest, (20_000, 4), endpoint=True)
-    numbers[0], numbers[1] = 0, largest
-    made = "".join(whole_rows(b"f %/% %//%\n", numbers))
-    assert made == "".join("f {}/{} {}//{}\n".format(*row) for row in numbers.tolist())
 
 
 def test_corners_with_as_many_slashes_in_all_are_read_word_by_word():

@@ -76,14 +76,6 @@ def test_polygons_of_many_sizes_are_the_same_in_every_encoding(order: str, besid
     assert any("element edge" in change.what for change in mesh.changes) == beside
 
 
-@pytest.mark.parametrize("order", ["<", ">", ""])
-@pytest.mark.parametrize("polygons", [[(0, 1, 2), (0, 2, 3)], [(0, 1, 2, 3)] * 3])
-def test_polygons_of_one_size_are_a_table(order: str, polygons: list) -> None:
-    mesh = read_ply(ply(order, polygons, beside=True))
-    assert mesh.corners.tolist() == [corner for polygon in polygons for corner in polygon]
-    assert mesh.sizes.tolist() == [len(polygon) for polygon in polygons]
-
-
 def test_polygons_of_fewer_than_three_corners_make_no_triangle() -> None:
     mesh = read(ply("<", [(), (1,), (0, 1), (0, 1, 2, 3)]), "ply")
     assert len(mesh.faces) == 2
@@ -96,26 +88,6 @@ def test_a_file_that_was_cut_off_says_where(order: str) -> None:
     for cut in (1, 4):
         with pytest.raises(UnreadableError, match="3 faces and ends after 2"):
             read(ply(order)[: -cut - (order == "")], "ply")
-
-
-@pytest.mark.parametrize(
-    ("data", "says"),
-    [
-        (ply("<").replace(b"face 3", b"face 9" + b"9" * 17), "ends after"),
-        (ply("<").replace(b"uint vertex", b"quad vertex"), "line 9 of the PLY header"),
-        (ply("<")[:100], "its header has no end"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1,5 2 3"), r"line 16 of the PLY file: '1,5'"),
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1.5 2 3"), "vertex_indices .* 1.5, no whole number"),
-        (ply("").replace(b"4 0 1 2 3", b"4.5 0 1 2 3"), "ends after"),
-        # No comment, which would hide the numbers behind it.
-        (ply("").replace(b"4 0 1 2 3", b"4 0 1 #2 3"), r"line 16 of the PLY file: '#2'"),
-        (ply("").replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
-        (b"OFF\n", "this is not a PLY"),
-    ],
-)
-def test_what_is_wrong_is_said_with_its_place(data: bytes, says: str) -> None:
-    with pytest.raises(UnreadableError, match=says):
-        read(data, "ply")
 
 
 TEXTURED = b"""ply
@@ -174,13 +146,6 @@ def test_textures_stay_in_a_ply_and_come_into_a_glb(name: bytes) -> None:
     report = converted(bare, "ply", "glb", options, None, Limits(), siblings=siblings).report
     told = {change["what"]: change["count"] for change in report["changes"]}
     assert told["names of textures dropped: there are no texture coordinates"] == 2
-
-
-def test_strips_turn_every_second_triangle() -> None:
-    head = ply("").partition(b"element face 3")[0] + b"element tristrips 1\n"
-    data = head + b"property list int int vertex_indices\nend_header\n"
-    data += b"".join(b"%g %g %g\n" % point for point in POINTS) + b"9 0 1 3 2 -1 0 1 1 2\n"
-    assert read(data, "ply").faces.tolist() == [[0, 1, 3], [3, 1, 2]]
 
 
 def test_normals_colours_and_double_positions_come_back_in_their_types() -> None:

@@ -16,7 +16,6 @@ from service.meshfiles.mesh_file import COLOUR, GROUP, MATERIAL, NORMAL, UV, Mes
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.flattened import flatten
-from tests.support.shared import shared_path
 
 CORNERS = [(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
 QUADS = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
@@ -212,16 +211,6 @@ def is_closed(mesh: MeshFile) -> bool:
     return len({*there}) == len(there) and {*there} == {(b, a) for a, b in there}
 
 
-def test_edges_that_a_model_keeps_sharp_break_the_shading_of_quads() -> None:
-    chosen = Options(normals="smooth")
-    written = converted(cube(), "obj", "obj", chosen, load_model(), Limits())
-    mesh = formats.read_polygons(written.content, "obj")
-    normals = mesh.layers[NORMAL].values[mesh.layers[NORMAL].rows].reshape(6, -1, 3)
-    sides = np.array(CORNERS)[np.array(QUADS)].mean(axis=1)
-    # Rounded over, a normal at an edge would be 45 degrees from its side's.
-    assert (np.einsum("scx,sx->sc", normals, sides) > np.cos(np.radians(10))).all()
-
-
 @pytest.mark.parametrize(
     ("normals", "limit"), [("keep", False), ("smooth", False), ("smooth", True)]
 )
@@ -263,19 +252,6 @@ def test_a_choice_of_no_polygon_is_refused() -> None:
         made(cube(), "obj", "obj", material="m2")
     with pytest.raises(UnrefinableError, match="three different"):
         made(cube() + b"usemtl thin\nf 1 2 2 1\n", "obj", "obj", material="thin")
-
-
-@pytest.mark.parametrize(
-    ("name", "area"),
-    [("concave_ngon_obj.obj", 30), ("concave_ngon_ply.ply", 30), ("dart_quad.obj", 0.5)],
-)
-def test_the_collections_concave_polygons_are_tiled(name: str, area: float) -> None:
-    """Sharp edges and fixed borders keep the outline, so quads that lie on others add area."""
-    path = shared_path("cases") / name
-    options = {"crease": "angle:30", "border": "fixed", "scheme": "catmull-clark"}
-    written = made(path.read_bytes(), path.suffix[1:], "obj", **options)
-    mesh = formats.read_polygons(written.content, "obj")
-    assert quad_areas(mesh).sum() == pytest.approx(area)
 
 
 def test_faces_that_are_none_are_dropped_and_reported() -> None:

@@ -111,16 +111,3 @@ def test_morph_targets_stand_as_their_weights_show_them(of_mesh, of_node, shown)
     faces = np.asarray(octahedron()["indices"]).reshape(-1, 3)
     expected = octahedron()["POSITION"] + np.tensordot(shown, deltas, axes=1)
     np.testing.assert_allclose(corners(tree, binary), expected[faces], rtol=1e-6)
-
-
-def test_joints_move_what_morph_targets_have_moved():
-    tree, binary = skinned([[1, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6)
-    delta = np.arange(18, dtype=np.float32).reshape(6, 3)
-    tree["meshes"][0]["primitives"][0]["targets"] = [
-        {"POSITION": files.add_accessor(tree, binary, delta)}
-    ]
-    tree["buffers"] = [{"byteLength": len(binary)}]
-    tree["meshes"][0]["weights"] = [2.0]
-    faces = np.asarray(octahedron()["indices"]).reshape(-1, 3)
-    moved = (octahedron()["POSITION"] + 2 * delta) @ TURN[:3, :3].T + [5, 0, 0]
-    np.testing.assert_allclose(corners(tree, binary), moved[faces], atol=1e-5)

@@ -8,7 +8,6 @@ import pytest
 from pns_common.mesh.mesh import Mesh
 from pns_common.operator.scheme import loop
 from pns_common.refinement import refine
-from service.errors import UnrefinableError
 from service.meshfiles import formats
 from service.meshfiles.formats import rounding_changes
 from service.meshfiles.mesh_file import MeshFile, of_triangles
@@ -61,16 +60,6 @@ def test_coordinates_beyond_float32_keep_every_face(
     np.testing.assert_array_equal(fine.vertices[fine.faces], expected.vertices[expected.faces])
 
 
-def test_faces_that_rounding_flattens_are_counted() -> None:
-    triangles = grid(spacing=0.1, offset=4.5e6)
-    x = triangles.vertices.astype(np.float32)[triangles.faces]
-    sides = [(x[:, i] == x[:, i - 1]).all(axis=1) for i in range(3)]
-    change, _ = rounding_changes(triangles)
-    assert change.count == np.any(sides, axis=0).sum() > 100
-    assert "float32" in change.what
-    assert rounding_changes(grid(spacing=0.1, offset=0)) == []
-
-
 @pytest.mark.parametrize(("offset", "told"), [(4.5e6, True), (4e5, True), (1e4, False), (0, False)])
 def test_faces_of_few_steps_of_float32_are_counted(offset: float, told: bool) -> None:
     """Of a map in metres, which rounding turns by some tenths of a degree."""
@@ -91,8 +80,3 @@ def turned_by_rounding(triangles: MeshFile) -> float:
     lengths = np.linalg.norm(exact, axis=1) * np.linalg.norm(rounded, axis=1)
     sine = np.linalg.norm(np.cross(exact, rounded), axis=1) / lengths
     return float(np.degrees(np.arcsin(sine.max())))
-
-
-def test_positions_beyond_the_range_of_float32_are_refused() -> None:
-    with pytest.raises(UnrefinableError, match="float32"):
-        rounding_changes(grid(spacing=1e40, offset=0))

@@ -28,18 +28,6 @@ def positions(mesh):
     return mesh.vertices[mesh.corners]
 
 
-def test_mesh_files_take_creases_by_angle():
-    triangles, report = refined(box(), levels=2, crease="angle:60")
-    assert report["levels"][0]["edges"]["crease"] == 12
-    assert (np.abs(triangles.vertices).max(axis=1) == 1).all()
-
-
-def test_mesh_files_keep_the_edges_that_the_model_asks_for():
-    for scheme, crease, count in ((ASKING, "auto", 12), (ASKING, "off", 0), (loop(), "auto", 0)):
-        _, report = refined(box(), scheme=scheme, crease=crease)
-        assert report["levels"][0]["edges"].get("crease", 0) == count
-
-
 @pytest.mark.parametrize("scheme", [loop(), catmull_clark()])
 def test_flat_shading_goes_where_no_edge_is_to_stay_sharp(scheme):
     shape = box()
@@ -66,22 +54,6 @@ def test_smooth_uvs_have_the_creases_of_the_positions(crease):
         shape, shape["POSITION"][:, 1:], levels=3, uv="smooth", crease=crease, scheme=ASKING
     )
     np.testing.assert_allclose(at_corners(triangles, UV), positions(triangles)[:, 1:], atol=1e-12)
-
-
-def test_a_weld_tolerance_is_counted():
-    flat = octahedron()["indices"].reshape(-1)
-    noise = 1e-6 * np.random.default_rng(0).standard_normal((24, 3))
-    loose = {
-        "POSITION": octahedron()["POSITION"][flat] + noise,
-        "indices": np.arange(24).reshape(-1, 3),
-    }
-    _, report = refined(loose, weld_tolerance=1e-4)
-    assert report["levels"][0]["edges"]["boundary"] == 0
-    assert {
-        "pointer": "",
-        "what": "vertices joined within weld_tolerance",
-        "count": 18,
-    } in report["changes"]
 
 
 def slit(opened):
@@ -112,12 +84,3 @@ def test_by_index_poses_have_one_numbering_and_by_position_they_need_not():
                 np.add.at(again, parents.rows, values)
                 np.testing.assert_allclose(again, mesh.vertices, atol=1e-14)
     assert counts == {"position": [15, 18], "index": [18, 18], "off": [18, 18]}
-
-
-def test_without_welding_seams_of_texture_coordinates_are_borders():
-    mesh = slit(0.0)
-    rows = np.arange(len(mesh.corners)) // 3
-    cut = replace(mesh, layers={UV: Layer(np.eye(4)[:, :2], rows)})
-    for weld, count in (("index", 18), ("off", 24)):
-        made, _ = refine_mesh_file(cut, loop(), Options(levels=1, weld=weld), Limits())
-        assert len(made.vertices) == count

@@ -83,19 +83,6 @@ def test_a_star_shaped_outline_in_any_plane_keeps_its_area() -> None:
         assert (normals @ normals[0] > 0).all()
 
 
-def test_a_concave_polygon_that_is_not_flat_uses_its_inner_diagonal() -> None:
-    mesh = cut([(0, 0, 0), (2, 0, 0.2), (2, 2, 0), (1, 0.5, 0.1)], [0, 1, 2, 3])
-    assert {3, 1} <= set(mesh.faces[0]) & set(mesh.faces[1])
-
-
-def test_triangles_stay_in_the_order_of_their_polygons() -> None:
-    points = SHAPES["a letter U"][0]
-    mesh = cut(points, [0, 1, 4], list(range(8)), [5, 6, 7])
-    assert mesh.faces[0].tolist() == [0, 1, 4]
-    assert mesh.faces[-1].tolist() == [5, 6, 7]
-    assert len(mesh.faces) == 1 + 6 + 1
-
-
 @pytest.mark.parametrize("turn", [1, -1])
 @pytest.mark.parametrize("shift", range(9))
 def test_a_side_that_turns_back_to_where_it_came_from_has_no_area(turn: int, shift: int) -> None:
@@ -105,12 +92,6 @@ def test_a_side_that_turns_back_to_where_it_came_from_has_no_area(turn: int, shi
     assert {(2, 4)} <= {tuple(point) for point in mesh.vertices[mesh.corners][:, :2].tolist()}
     beyond = cut([*points[:6], (2, 5), (0, 4)], [*range(8)])
     assert any("cross themselves" in change.what for change in beyond.changes)
-
-
-def test_a_polygon_that_crosses_itself_is_reported() -> None:
-    mesh = cut([(0, 0), (1, 1), (1, 0), (0, 1)], [0, 1, 2, 3])
-    assert len(mesh.faces) == 2
-    assert any("cross themselves" in change.what for change in mesh.changes)
 
 
 def test_a_whisker_of_thousands_of_corners_is_cut_like_any_polygon() -> None:

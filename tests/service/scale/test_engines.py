@@ -143,19 +143,6 @@ def test_without_ray_its_extra_is_named(monkeypatch):
         on_ray.on_ray(Work(str, never, None), None, 1)
 
 
-def test_small_tasks_fill_a_chunk_and_long_ones_go_alone():
-    assert chunks.Done([0] * 3, 0.003).next_size == chunks.MOST
-    assert chunks.Done([0] * 10, 1.0).next_size == 5
-    assert chunks.Done([0], 60.0).next_size == 1
-
-
-def test_a_chunk_ends_when_its_time_is_over(monkeypatch):
-    monkeypatch.setattr(chunks, "SECONDS", -1.0)
-    assert chunks.do(str, [1, 2, 3], None).results == ["1"]
-    monkeypatch.setattr(chunks, "SECONDS", 1e9)
-    assert chunks.do(str, [1, 2, 3], None).results == ["1", "2", "3"]
-
-
 class Ray:
     """Stands in for the module: cannot be started, as often as it is told."""
 

@@ -1,8 +1,6 @@
 """Knowledge of a library's files outlives a run, and several runs at once."""
 
-import fcntl
 import json
-import sqlite3
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,38 +20,6 @@ def test_a_journal_knows_only_what_was_done_by_the_same_work(tmp_path):
     other = Journal(tmp_path / "r.jsonl", "two")
     assert other.known("a") is None
     other.close()
-
-
-def locked(folder):
-    """Return whether some run keeps others from the journals of a folder."""
-    with (folder / ".pns-batch.journal-lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
-
-
-def test_a_journal_is_opened_and_closed_by_one_run_at_a_time(tmp_path, monkeypatch):
-    """SQLite answers "locked" at once, whatever its timeout, where a log is begun or tidied up."""
-    seen = []
-
-    class Watched(sqlite3.Connection):
-        def close(self):
-            seen.append(("close", locked(tmp_path), (tmp_path / "r.jsonl").exists()))
-            super().close()
-
-    def connect(path, **settings):
-        seen.append(("open", locked(tmp_path)))
-        return Watched(path, **settings)
-
-    monkeypatch.setattr("service.scale.journal.sqlite3.connect", connect)
-    journal = Journal(tmp_path / "r.jsonl", "work")
-    assert not locked(tmp_path)
-    journal.close()
-    # The report is written under the lock too: the last of several runs has the rows of all.
-    assert seen == [("open", True), ("close", True, True)]
-    assert not locked(tmp_path)
 
 
 def test_a_file_that_is_no_journal_is_told_by_name(tmp_path):

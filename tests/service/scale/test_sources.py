@@ -17,7 +17,6 @@ from rich.console import Console
 from service.errors import InvalidParameter
 from service.scale.batch import run_batch
 from service.scale.job import SKIPPED, Row
-from service.scale.places import place_of
 from service.scale.sources import items_of
 from tests.service.scale.libraries import (
     KINDS,
@@ -106,19 +105,6 @@ def test_no_manifest_leads_a_result_out_of_its_folder(tmp_path, line):
     assert "/../" not in item.relative
 
 
-def test_a_long_manifest_takes_no_memory(tmp_path):
-    manifest = tmp_path / "list.txt"
-    with manifest.open("w") as file:
-        file.writelines(f"folder/file-{number}.obj\n" for number in range(10_000))
-    listing = items_of(str(manifest), KINDS)
-    tracemalloc.start()
-    try:
-        assert sum(1 for _ in listing()) == 10_000
-        assert tracemalloc.get_traced_memory()[1] < 300_000
-    finally:
-        tracemalloc.stop()
-
-
 def test_a_driver_holds_no_row_of_a_long_manifest(tmp_path):
     count = 5000
     with (tmp_path / "list.txt").open("w") as file:
@@ -180,14 +166,6 @@ def test_a_parquet_manifest_needs_a_column_of_paths_and_what_reads_it(tmp_path, 
         list(items_of(str(tmp_path / "list.parquet"), KINDS)())
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(InvalidParameter, match=r"pns-subdivision\[ray\]"):
-        list(items_of(str(tmp_path / "list.parquet"), KINDS)())
-
-
-def test_a_parquet_row_without_a_path_is_told(tmp_path):
-    arrow = pytest.importorskip("pyarrow", reason="the extra [ray] is not installed")
-    parquet = pytest.importorskip("pyarrow.parquet")
-    parquet.write_table(arrow.table({"path": ["a.obj", None]}), tmp_path / "list.parquet")
-    with pytest.raises(InvalidParameter, match="row 2"):
         list(items_of(str(tmp_path / "list.parquet"), KINDS)())
 
 
@@ -274,18 +252,6 @@ def test_a_folder_that_cannot_be_listed_costs_its_own_files_and_is_told(tmp_path
     assert sorted(rows(batch)) == ["a.obj", "z.obj"]
     monkeypatch.undo()
     assert refined(batch).counts == {"done": 1, "skipped": 2}
-
-
-def test_a_folder_of_a_store_that_cannot_be_listed_is_told(monkeypatch):
-    place = place_of("memory://private/library")
-    place.below("a.obj").write(b"")
-
-    def refuses(*_, **__):
-        raise PermissionError(errno.EACCES, "Permission denied", "/private/library")
-
-    monkeypatch.setattr(type(place.system), "ls", refuses)
-    (item,) = items_of("memory://private/library", KINDS)()
-    assert item.fault == "Permission denied"
 
 
 @pytest.mark.filterwarnings("ignore")

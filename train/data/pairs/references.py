@@ -104,9 +104,19 @@ def sphere_pair(rng: np.random.Generator, coarsen: Coarsen | None = None) -> Pai
             coarse = with_points(coarse, unit * axes)
     if coarse is None:
         return None
-    normals = dense.vertices / axes
+    return Pair("sphere", coarse, _ellipsoid(dense, axes), SMOOTH)
+
+
+def ball_pair(rng: np.random.Generator) -> Pair:
+    """Return an icosahedron, or one split once, and the sphere through its corners."""
+    coarse = icosphere(int(rng.integers(2)))
+    return Pair("ball", coarse, _ellipsoid(icosphere(DENSE_SPLITS), np.ones(3)), SMOOTH)
+
+
+def _ellipsoid(sphere: Mesh, axes: Float[np.ndarray, " 3"]) -> Reference:
+    normals = sphere.vertices / axes
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Pair("sphere", coarse, Reference(dense.vertices * axes, normals), SMOOTH)
+    return Reference(sphere.vertices * axes, normals)
 
 
 LEVELS, PROJECTIONS = 3, 4

@@ -12,20 +12,15 @@ import pytest
 from benchmarks.memory import peak_mib, reset_peak
 from service.errors import GltfError, LimitError, ServiceError, UnsupportedFeature
 from service.gltf.read.compressed import read_header
-from service.gltf.subdivide import subdivide_gltf
 from service.memory_cap import memory_cap
-from service.options import Limits, Options
+from service.options import Limits
 from tests.fuzz.seeds import compressed_views, draco
+from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
 
 FOUR_BILLION = b"\xff\xff\xff\xff\x0f"
 MESHOPT = "EXT_meshopt_compression"
-
-
-def refine(data, limits=None):
-    options = Options(scheme="loop", levels=1)
-    return subdivide_gltf(data, "glb", options, None, limits or Limits())
 
 
 def costs_nothing(data, error, limits=None):
@@ -35,7 +30,7 @@ def costs_nothing(data, error, limits=None):
     before, began = peak_mib(), perf_counter()
     try:
         with pytest.raises(error) as refusal:
-            refine(data, limits)
+            refine(data, limits=limits)
         assert tracemalloc.get_traced_memory()[1] < 2**22
     finally:
         tracemalloc.stop()
@@ -77,8 +72,8 @@ def test_draco_takes_normalised_integers():
     assert (accessor["componentType"], accessor["normalized"]) == (5122, True)
     primitive["attributes"] = {"POSITION": primitive["attributes"]["POSITION"]}
     tree["extensionsUsed"] = ["KHR_draco_mesh_compression", "KHR_mesh_quantization"]
-    expected = refine(files.pack(*files.document([plain])), Limits())
-    refined = refine(draco_file(data, tree), Limits())
+    expected = refine(files.pack(*files.document([plain])), limits=Limits())
+    refined = refine(draco_file(data, tree), limits=Limits())
     assert refined.report["levels"] == expected.report["levels"]
     assert refined.report["meshes"] == expected.report["meshes"]
 
@@ -89,7 +84,7 @@ def test_nodes_are_predicted_before_they_are_made():
     text = json.dumps(tree).replace('"nodes": [', '"nodes": [' + "{}," * 900_000)
     limits = Limits(max_memory_bytes=100 * 2**20, max_json_items=10**7)
     with pytest.raises(LimitError) as refusal:
-        refine(files.pack(text.encode(), binary), limits)
+        refine(files.pack(text.encode(), binary), limits=limits)
     assert refusal.value.limit == "memory"
 
 
@@ -158,7 +153,7 @@ def test_attributes_that_a_header_does_not_announce_are_capped():
     before = peak_mib()
     limits = Limits(max_memory_bytes=64 * 2**20)
     with pytest.raises(ServiceError) as refusal:
-        refine(draco_file(data), limits)
+        refine(draco_file(data), limits=limits)
     assert 400 <= refusal.value.status < 500
     assert peak_mib() - before < 64 + 64
 

@@ -37,18 +37,6 @@ def test_chunks_are_counted_before_they_are_made():
     assert len(read_glb(files.pack(b"{}", others=[(b"XTRA", b"")] * 63)).others) == 63
 
 
-def test_a_file_without_binary_chunk_has_none():
-    container = read_glb(files.pack(b"{}"))
-    assert container.binary is None
-    assert write_glb(b"{}", [], []) == files.pack(b"{}")
-
-
-def test_a_foreign_second_chunk_is_not_taken_for_the_binary_one():
-    container = read_glb(files.pack(b"{}", others=[(b"XTRA", b"more")]))
-    assert container.binary is None
-    assert len(container.others) == 1
-
-
 def test_first_bytes_say_which_of_both_a_file_is():
     binary, text = files.pack(b"{}", b"1234"), b"\xef\xbb\xbf\n {}"
     for kind in ("glb", "gltf"):

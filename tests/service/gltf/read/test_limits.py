@@ -171,10 +171,3 @@ def test_a_data_uri_of_numbers_takes_what_any_text_does(step):
     finally:
         tracemalloc.stop()
     assert used < 6 * len(body)
-
-
-def test_a_buffer_without_bytes_is_refused():
-    tree, _ = files.document([box()])
-    with pytest.raises(GltfError, match="neither") as refusal:
-        refine(json.dumps(tree).encode(), media="gltf")
-    assert refusal.value.pointer == "/buffers/0"

@@ -58,15 +58,6 @@ def test_an_uploads_own_bytes_are_predicted():
     assert refusal.value.limit == "memory"
 
 
-def test_prediction_grows_with_the_upload_by_what_an_answer_copies():
-    predicted = []
-    for size in (2**20, 2**21):
-        with pytest.raises(LimitError) as refusal:
-            subdivide_gltf(with_image(size), "glb", LOOP, None, Limits(max_memory_bytes=10**6))
-        predicted.append(refusal.value.found)
-    assert predicted[1] - predicted[0] >= 2 * 2**20
-
-
 def test_the_limit_is_predicted_where_every_edge_is_a_crease():
     vertices, faces = bumpy_sphere(subdivisions=3)
     data = files.glb([{"POSITION": vertices, "indices": faces}])
@@ -85,7 +76,7 @@ def test_a_letter_that_makes_all_of_its_string_wide_is_predicted(letter, place):
 
 
 def test_what_is_narrow_is_predicted_as_wide_as_it_is_written():
-    vertices, faces = bumpy_sphere(subdivisions=3)
+    vertices, faces = bumpy_sphere(subdivisions=2)
     corners = vertices[faces].reshape(-1, 3)
     narrow = {f"_A{n}": np.ones((len(corners), 1), np.uint8) for n in range(100)}
     data = files.glb([{"POSITION": corners, **narrow}])
@@ -95,7 +86,7 @@ def test_what_is_narrow_is_predicted_as_wide_as_it_is_written():
 @pytest.mark.parametrize("whose", ["its own", "another's", "another's joints"])
 def test_what_moves_a_mesh_is_predicted_where_it_moves_nothing(whose):
     """Targets without positions, and what one primitive has and others have not, are zeros."""
-    vertices, faces = bumpy_sphere(subdivisions=3)
+    vertices, faces = bumpy_sphere(subdivisions=2)
     large = {"POSITION": vertices, "indices": faces}
     small = octahedron(POSITION=4 + octahedron()["POSITION"])
     if whose == "its own":

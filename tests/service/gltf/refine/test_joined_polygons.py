@@ -178,17 +178,6 @@ def test_copies_of_faces_follow_the_faces_that_they_copy():
     }
 
 
-def test_two_materials_of_a_shape_stay_closed():
-    first = {"POSITION": POINTS, "indices": halves(CUBE[:3])}
-    made = subdivide(first, {"POSITION": POINTS, "indices": halves(CUBE[3:])}, levels=2)
-    tree, binary = files.unpack(made.glb)
-    seen = set()
-    for primitive in tree["meshes"][0]["primitives"]:
-        points = files.values_of(tree, binary, primitive["attributes"]["POSITION"])
-        seen |= {tuple(p) for p in points.tolist()}
-    assert len(seen) == len(refine(Mesh(POINTS, CUBE), catmull_clark(), 2).mesh.vertices)
-
-
 def test_hard_edges_keep_a_normal_for_each_side():
     made = subdivide(box(), scheme="catmull-clark", crease="normals", levels=2)
     faces, attributes = files.primitive_of(made.glb)
@@ -219,14 +208,6 @@ def test_a_mesh_of_quads_is_found_whatever_the_order_of_its_triangles():
     for own in (faces, shuffled):
         made = subdivide({"POSITION": points, "indices": own}, levels=1)
         assert made.report["totals"]["faces"] == 25 * 8
-
-
-@pytest.mark.parametrize("uv", ["linear", "smooth"])
-def test_a_primitive_without_area_stays_as_it_is_beside_polygons(uv):
-    flat = {"POSITION": np.zeros((3, 3)), "indices": np.arange(3), "TEXCOORD_0": np.eye(3)[:, :2]}
-    made = subdivide(flat, cube(TEXCOORD_0=POINTS[:, :2]), uv=uv)
-    assert made.report["totals"]["primitives"] == 1
-    assert len(files.primitive_of(made.glb, primitive=1)[0]) == 12 * 4**2
 
 
 def test_repeated_and_degenerate_triangles_do_no_harm():

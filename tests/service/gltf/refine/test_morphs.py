@@ -5,14 +5,9 @@ import pytest
 
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
+from tests.service.gltf.subdivided import subdivide
 from tests.support.gltf import files, validator
 from tests.support.gltf.shapes import box, octahedron
-from tests.support.networks import random_model
-
-
-def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", "levels": 1, **options})
-    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 
 def deltas(seed, count=6, size=0.3):
@@ -91,18 +86,6 @@ def test_morphed_normals_are_those_of_the_morphed_surface(limit, close):
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1, atol=1e-5)
 
 
-def test_morphed_tangents_are_unit_and_perpendicular_to_morphed_normals():
-    names = ("POSITION", "NORMAL", "TANGENT")
-    result = subdivide([box(targets=[box_deltas(5, names)])], levels=2).glb
-    _, attributes = files.primitive_of(result)
-    (target,) = files.targets_of(result)
-    assert target["TANGENT"].shape[1] == 3
-    tangents = attributes["TANGENT"][:, :3] + target["TANGENT"]
-    normals = attributes["NORMAL"] + target["NORMAL"]
-    np.testing.assert_allclose(np.linalg.norm(tangents, axis=1), 1, atol=1e-5)
-    np.testing.assert_allclose((tangents * normals).sum(axis=1), 0, atol=1e-5)
-
-
 def test_morphed_tangents_run_as_those_of_the_morphed_mesh():
     moved = {"TANGENT": deltas(4, 24, 0.3)}
     given = box()["TANGENT"].copy()
@@ -162,12 +145,6 @@ def test_a_zero_of_either_sign_or_none_moves_nothing_apart(others):
         for at, targets in ((slice(4), still), (slice(4, 8), others))
     ]
     assert subdivide(halves).report["levels"][0]["edges"]["boundary"] == 0
-
-
-def test_tangents_of_a_target_alone_are_linear():
-    plain = {name: values for name, values in box().items() if name != "TANGENT"}
-    result = subdivide([{**plain, "targets": [{"TANGENT": np.full((24, 3), 0.25)}]}]).glb
-    assert (files.targets_of(result)[0]["TANGENT"] == 0.25).all()
 
 
 def test_closed_lips_that_part_stay_two():

@@ -51,11 +51,6 @@ def test_what_lies_within_ten_degrees_of_its_faces_says_nothing_of_its_own():
     assert shares[4:].tolist() == [1, 1, 1]
 
 
-def test_without_a_direction_or_a_face_there_is_nothing_to_say():
-    assert own_shares(np.zeros((1, 3)), np.array([[0.0, 0, 1]])).tolist() == [0]
-    assert own_shares(np.array([[0.0, 0, 1]]), np.zeros((1, 3))).tolist() == [0]
-
-
 @pytest.mark.parametrize("levels", [1, 3])
 def test_a_sheet_that_is_lit_as_a_ball_stays_so(levels):
     # As foliage is: its normals lead away from a point that lies aside, 25 degrees and more.

@@ -9,14 +9,9 @@ from pns_common.parallel import Blocks
 from service.course import Course
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
-from tests.support.gltf import files, validator
+from tests.service.gltf.subdivided import subdivide
+from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
-from tests.support.networks import random_model
-
-
-def subdivide(*meshes, **options):
-    options = Options(**{"scheme": "loop", "levels": 1, **options})
-    return subdivide_gltf(files.glb(*meshes), "glb", options, random_model(0), Limits())
 
 
 def bound(joints, weights, **others):
@@ -53,10 +48,6 @@ def test_weights_follow_the_positions_of_loop(levels):
     np.testing.assert_allclose(by_row[faces], expected.vertices[expected.faces], atol=2e-7)
 
 
-def test_where_there_is_room_for_all_joints_none_is_said_to_be_lost():
-    assert subdivide([bound(*random_binding(0))], levels=2).report["changes"] == []
-
-
 def test_a_joint_whose_weight_rounds_to_nothing_is_none():
     """A 255th of one vertex is less than half as much everywhere else."""
     joints, weights = np.tile([3, 0, 0, 0], (6, 1)), np.tile([255, 0, 0, 0], (6, 1))
@@ -64,19 +55,6 @@ def test_a_joint_whose_weight_rounds_to_nothing_is_none():
     shape = bound(joints, files.Normalized(weights.astype(np.uint8)))
     _, attributes = files.primitive_of(subdivide([shape], levels=2).glb)
     assert not attributes["JOINTS_0"][attributes["WEIGHTS_0"] == 0].any()
-
-
-def test_the_learned_correction_changes_no_weight():
-    shape = bound(*random_binding(1))
-    pairs = [
-        {name: values[faces] for name, values in attributes.items()}
-        for faces, attributes in (
-            files.primitive_of(subdivide([shape], scheme=s, levels=2).glb) for s in ("pns", "loop")
-        )
-    ]
-    for name in ("JOINTS_0", "WEIGHTS_0"):
-        np.testing.assert_array_equal(pairs[0][name], pairs[1][name])
-    assert (pairs[0]["POSITION"] != pairs[1]["POSITION"]).any()
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.uint8, np.uint16])
@@ -168,30 +146,6 @@ def test_joints_of_a_neighbour_widen_the_type():
     _, attributes = files.primitive_of(result.glb)
     assert attributes["JOINTS_0"].dtype == np.uint16
     assert 300 in attributes["JOINTS_0"]
-
-
-def test_vertices_without_weight_keep_none():
-    joints, weights = random_binding(2)
-    weights[:] = 0
-    _, attributes = files.primitive_of(subdivide([bound(joints, weights)]).glb)
-    assert not attributes["WEIGHTS_0"].any()
-    assert not attributes["JOINTS_0"].any()
-
-
-@pytest.mark.spawning
-def test_a_mesh_shown_with_and_without_its_skin_is_refined_once(tmp_path):
-    tree, binary = files.document([bound(*random_binding(3))])
-    tree["nodes"] += [{"mesh": 0, "skin": 0}, {}, {}, {}]
-    tree["skins"] = [{"joints": [2, 3, 4]}]
-    tree["scenes"] = [{"nodes": [0, 1, 2, 3, 4]}]
-    data = files.pack(tree, binary)
-    result = subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits())
-    after, _ = files.unpack(result.glb)
-    assert (after["nodes"], after["skins"]) == (tree["nodes"], tree["skins"])
-    assert result.report["meshes"][0]["instances"] == 2
-    path = tmp_path / "skinned.glb"
-    path.write_bytes(result.glb)
-    assert validator.errors([path]) == [[]]
 
 
 @pytest.mark.parametrize("copies", [1, 2])

@@ -78,28 +78,11 @@ def test_hard_edges_of_the_file_are_softened():
     assert directions(smooth) == 1
 
 
-def test_creases_part_the_normals_and_nothing_else_does():
-    creased = primitive_of(refined([flat_box()], crease="angle:30"))
-    # A box whose edges all are creases keeps its six flat sides.
-    np.testing.assert_allclose(np.abs(creased["NORMAL"]).max(axis=1), 1, atol=1e-6)
-    assert directions(creased) == 3
-
-
 def test_creases_by_the_files_own_normals_are_found_before_these_are_replaced():
     by_normals = primitive_of(refined([flat_box()], crease="normals"))
     by_angle = primitive_of(refined([flat_box()], crease="angle:30"))
     for name in ("POSITION", "NORMAL"):
         np.testing.assert_array_equal(by_normals[name], by_angle[name])
-
-
-def test_a_seam_between_primitives_is_smooth():
-    whole = plain(octahedron())
-    faces = np.asarray(whole["indices"]).reshape(-1, 3)
-    halves = [whole | {"indices": faces[:4]}, whole | {"indices": faces[4:]}]
-    glb_of_halves = refined(halves)
-    left, right = (primitive_of(glb_of_halves, primitive=number) for number in (0, 1))
-    together = {name: np.concatenate([left[name], right[name]]) for name in ("POSITION", "NORMAL")}
-    assert directions(together) == 1
 
 
 def test_a_face_and_its_back_have_opposite_normals():
@@ -111,21 +94,6 @@ def test_a_face_and_its_back_have_opposite_normals():
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     along = (result["NORMAL"][result["indices"].reshape(-1, 3)] * normal[:, None]).sum(axis=2)
     assert (along > 0).all()
-
-
-def test_other_attributes_stay_with_their_corners():
-    rng = np.random.default_rng(0)
-    shape = box()
-    shape["TEXCOORD_0"] = rng.random((len(shape["POSITION"]), 2))
-    kept, smooth = (
-        primitive_of(refined([shape], normals=rule, crease="angle:30"))
-        for rule in ("keep", "smooth")
-    )
-    for name in ("POSITION", "TEXCOORD_0"):
-        kept_values, smooth_values = (
-            primitive[name][primitive["indices"].reshape(-1)] for primitive in (kept, smooth)
-        )
-        np.testing.assert_array_equal(kept_values, smooth_values)
 
 
 def test_normals_of_the_limit_are_those_that_ever_deeper_levels_approach():

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model
-from pns_common.carry.columns import ColumnRefinement
 from service.course import Course
-from service.gltf.read.plan import MeshPlan
-from service.gltf.refine import meshes, together
+from service.gltf.refine import meshes
 from service.gltf.subdivide import Subdivided, subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
@@ -47,38 +42,8 @@ MORE_OPTIONS = [
 ]
 
 
-def scene() -> bytes:
-    """Meshes of two kinds with copies, degenerate and turned faces, and some that go alone."""
-    rng = np.random.default_rng(3)
-    shapes = []
-    for number in range(24):
-        shape = dict(box() if number % 3 else octahedron())
-        scaled = np.asarray(shape["POSITION"]) * rng.uniform(0.1, 4, 3) + rng.normal(size=3)
-        shape["POSITION"] = scaled.astype(np.float32)
-        if number % 4 == 0:
-            faces = np.asarray(shape["indices"]).reshape(-1, 3)
-            more = [faces, faces[:2], [[0, 0, 1]], faces[2:3, ::-1]]
-            shape["indices"] = np.concatenate(more)
-        shapes.append([shape])
-    shapes.insert(7, [box(), octahedron()])
-    shapes.insert(9, [{"POSITION": np.zeros((3, 3), np.float32), "indices": np.arange(3)}])
-    return files.pack(*files.document(*shapes))
-
-
 def refine(data: bytes, **options: object) -> Subdivided:
     return subdivide_gltf(data, "glb", Options(**options), MODEL, Limits())
-
-
-@pytest.mark.parametrize("options", OPTIONS, ids=str)
-def test_together_is_as_alone_to_the_last_byte(
-    options: dict[str, object], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    data = scene()
-    made = refine(data, **options)
-    monkeypatch.setattr(meshes, "MOST_FACES", -1)
-    alone = refine(data, **options)
-    assert made.report == alone.report
-    assert made.glb == alone.glb
 
 
 @pytest.mark.parametrize("options", [{}, {"normals": "smooth"}, {"uv": "smooth"}], ids=str)
@@ -195,71 +160,6 @@ def test_no_small_mesh_goes_alone(
     assert refine(files.glb(*whole), **asked).report["totals"]["meshes"] == len(whole)
 
 
-def counting(
-    linear: Callable[[object, np.ndarray], np.ndarray], columns: list[int]
-) -> Callable[[object, np.ndarray], np.ndarray]:
-    """Also keep how many columns are refined."""
-
-    def counted(self: object, block: np.ndarray) -> np.ndarray:
-        columns.append(block.shape[1])
-        return linear(self, block)
-
-    return counted
-
-
-def test_joints_of_one_mesh_do_not_wait_for_those_of_another() -> None:
-    rng = np.random.default_rng(1)
-    shapes = []
-    for number in range(40):
-        shape = octahedron()
-        shape["JOINTS_0"] = (np.arange(24).reshape(6, 4) % 4 + 4 * number).astype(np.uint8)
-        shape["WEIGHTS_0"] = rng.random((6, 4)).astype(np.float32)
-        shapes.append([shape])
-    columns: list[int] = []
-    with pytest.MonkeyPatch.context() as patch:
-        counted = counting(ColumnRefinement.__call__, columns)
-        patch.setattr(ColumnRefinement, "__call__", counted)
-        assert refine(files.glb(*shapes)).report["totals"]["meshes"] == 40
-    assert sum(columns) == 4
-
-
-def test_one_mesh_without_a_face_does_not_send_the_others_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    alone: list[int] = []
-    original = meshes.refine_alone
-
-    def counted(plan: MeshPlan, *rest: Any, **named: Any) -> object:
-        alone.append(plan.mesh)
-        return original(plan, *rest, **named)
-
-    monkeypatch.setattr(meshes, "refine_alone", counted)
-    flat = octahedron(indices=np.array([[0, 0, 1]] * 8))
-    point = octahedron() | {"POSITION": np.zeros((6, 3)) + 2, "targets": [spread()]}
-    plain = octahedron(targets=[spread()])
-    made = refine(files.glb([plain], [plain], [point], [plain], [octahedron()], [flat]))
-    assert made.report["totals"]["meshes"] == 5
-    assert alone == [2, 5]
-
-
-def spread() -> dict[str, np.ndarray]:
-    """A morph target that moves each vertex of an octahedron its own way."""
-    return {"POSITION": octahedron()["POSITION"].astype(np.float32)}
-
-
-def test_a_scene_of_small_meshes_is_a_handful_of_groups(monkeypatch: pytest.MonkeyPatch) -> None:
-    groups: list[int] = []
-
-    def counted(meshes: list[object], *rest: object) -> object:
-        groups.append(len(meshes))
-        return together.refine_together(meshes, *rest)
-
-    monkeypatch.setattr(meshes, "refine_together", counted)
-    data = files.pack(*files.document(*([[octahedron()]] * 300)))
-    assert refine(data).report["totals"]["meshes"] == 300
-    assert groups == [300]
-
-
 def test_a_mesh_that_cannot_be_refined_is_named_among_others() -> None:
     far = octahedron() | {"POSITION": octahedron()["POSITION"] * np.float32(3e38)}
     data = files.pack(*files.document([octahedron()], [far], [octahedron()]))
@@ -268,10 +168,11 @@ def test_a_mesh_that_cannot_be_refined_is_named_among_others() -> None:
     assert getattr(refusal.value, "pointer", None) == "/meshes/1"
 
 
-def test_progress_goes_on_through_groups() -> None:
+def test_progress_goes_on_through_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshes, "GROUP_FACES", 1000)
     shapes = [[octahedron()]] * 5 + [[box()]] + [[octahedron()]] * 5
     told: list[float] = []
-    options = Options(levels=6)
+    options = Options(levels=3)
     data = files.pack(*files.document(*shapes))
     subdivide_gltf(data, "glb", options, MODEL, Limits(), Course(moves=told.append))
     assert told == sorted(told)

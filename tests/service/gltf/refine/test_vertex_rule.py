@@ -11,7 +11,6 @@ from service.gltf.subdivide import subdivide_gltf
 from service.meshes.weld import weld
 from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import of_triangles
-from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf import files
@@ -94,27 +93,6 @@ def test_vertices_on_creases_are_where_loop_puts_them(crease):
     assert departure(soft, subdivide([cylinder()], levels=2, scheme="loop"))[ends].any()
 
 
-def test_every_vertex_of_a_creased_cube_stays():
-    result = subdivide([box()], crease="angle:89", levels=2)
-    assert result.report["levels"][0]["vertex_rule"]["vertices"] == 0
-    assert not departure(
-        result, subdivide([box()], crease="angle:89", levels=2, scheme="loop")
-    ).any()
-
-
-@pytest.mark.parametrize("levels", [1, 2])
-def test_morph_targets_stay_loops_and_weight_zero_the_base_pose(levels):
-    moved = {"POSITION": 0.3 * np.random.default_rng(0).standard_normal((6, 3))}
-    result = subdivide([octahedron(targets=[moved])], levels=levels)
-    np.testing.assert_array_equal(
-        corners(result), corners(subdivide([octahedron()], levels=levels))
-    )
-    by_loop = subdivide([octahedron(targets=[moved])], levels=levels, scheme="loop")
-    (ours,), (theirs,) = (files.targets_of(each.glb) for each in (result, by_loop))
-    np.testing.assert_array_equal(ours["POSITION"], theirs["POSITION"])
-    assert departure(result, by_loop)[is_old(8, levels)].all()
-
-
 def test_skin_weights_are_those_of_loop():
     weights = np.random.default_rng(1).dirichlet(np.ones(3), 6)
     bound = octahedron(
@@ -125,47 +103,6 @@ def test_skin_weights_are_those_of_loop():
     for name in ("JOINTS_0", "WEIGHTS_0"):
         np.testing.assert_array_equal(corners(result, name), corners(by_loop, name))
     assert departure(result, by_loop)[is_old(8, 2)].all()
-
-
-@pytest.mark.parametrize("uv", ["linear", "smooth"])
-def test_texture_coordinates_are_those_of_loop(uv):
-    shape = octahedron(TEXCOORD_0=np.random.default_rng(0).random((6, 2)))
-    result, by_loop = (
-        subdivide([shape], levels=2, uv=uv, scheme=scheme) for scheme in ("pns", "loop")
-    )
-    np.testing.assert_array_equal(corners(result, "TEXCOORD_0"), corners(by_loop, "TEXCOORD_0"))
-
-
-def test_normals_are_those_of_the_surface_that_is_written():
-    shape = octahedron(NORMAL=octahedron()["POSITION"])
-    result = subdivide([shape], levels=3, budget=0.2)
-    normals, points = corners(result, "NORMAL"), corners(result).astype(np.float64)
-    flat = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    assert (np.einsum("fi,fci->fc", flat, normals) > 0).mean() > 0.95
-    by_loop = subdivide([shape], levels=3, scheme="loop")
-    assert np.abs(normals - corners(by_loop, "NORMAL")).max() > 0.01
-
-
-def test_vertices_on_a_boundary_are_where_loop_puts_them():
-    # Without one face, three vertices lie on a boundary and three have closed rings.
-    shape = octahedron(indices=octahedron()["indices"][1:])
-    result, by_loop = (subdivide([shape], scheme=scheme) for scheme in ("pns", "loop"))
-    old = shape["indices"].reshape(-1)
-    apart = departure(result, by_loop)[is_old(7, 1)]
-    assert not apart[np.isin(old, octahedron()["indices"][0])].any()
-    assert apart[np.isin(old, [1, 3, 5])].all()
-
-
-def test_mesh_files_are_refined_by_the_same_rule():
-    shape = octahedron()
-    triangles = of_triangles(shape["POSITION"], shape["indices"])
-    options = Options(levels=2, crease="off")
-    refined, report = refine_mesh_file(triangles, pns(MODEL), options, Limits())
-    expected = refine(welded_octahedron(), pns(MODEL), 2, creases=None)
-    np.testing.assert_array_equal(
-        refined.vertices[refined.faces], expected.mesh.vertices[expected.mesh.faces]
-    )
-    assert report["levels"][0]["vertex_rule"]["vertices"] == 6
 
 
 def test_the_result_does_not_depend_on_the_number_of_threads():

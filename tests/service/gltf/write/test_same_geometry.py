@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from service.gltf import subdivide
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.gltf import files
@@ -54,35 +53,3 @@ def test_meshes_that_differ_in_one_accessor_share_nothing():
     glb = refined(tree, binary, levels=1).glb
     (_, small), (_, large) = (files.primitive_of(glb, mesh) for mesh in (0, 1))
     np.testing.assert_allclose(large["POSITION"], 2 * small["POSITION"], rtol=1e-6)
-
-
-def test_targets_are_shared_with_the_rest():
-    delta = np.ones((6, 3), dtype=np.float32)
-    tree, binary = two_of_one(targets=[{"POSITION": delta}])
-    after, _ = files.unpack(refined(tree, binary, levels=1).glb)
-    one, other = (mesh["primitives"][0] for mesh in after["meshes"])
-    assert one["targets"] == other["targets"]
-
-
-def test_they_are_refined_once_and_each_is_told_of(monkeypatch):
-    refine, refined_first = subdivide.refined_meshes, []
-
-    def watched(upload, plans, *rest, **asked):
-        refined_first.extend(plan.mesh for plan in plans)
-        return refine(upload, plans, *rest, **asked)
-
-    monkeypatch.setattr(subdivide, "refined_meshes", watched)
-    faces = np.concatenate([octahedron()["indices"].reshape(-1), [0, 0, 1]])
-    tree, binary = two_of_one(indices=faces.reshape(-1, 1))
-    tree["meshes"].insert(1, tree["meshes"][0] | {"primitives": []})
-    tree["meshes"][2]["primitives"] *= 2
-    tree["meshes"] += [tree["meshes"][2], tree["meshes"][0]]
-    tree["nodes"] = [{"mesh": number} for number in (0, 2, 3, 4, 4)]
-    tree["scenes"][0]["nodes"] = list(range(5))
-    report = refined(tree, binary).report
-    assert refined_first == [0, 2]
-    assert [mesh["index"] for mesh in report["meshes"]] == [0, 2, 3, 4]
-    assert [mesh["instances"] for mesh in report["meshes"]] == [1, 1, 1, 2]
-    dropped = [each["pointer"] for each in report["changes"] if "degenerate" in each["what"]]
-    ways = ("0/primitives/0", *(f"{mesh}/primitives/{n}" for mesh in (2, 3) for n in (0, 1)))
-    assert dropped == [f"/meshes/{way}" for way in (*ways, "4/primitives/0")]

@@ -78,16 +78,3 @@ def test_they_move_the_same_vertices_by_the_same(options, tmp_path):
     assert sparse.report["changes"] == dense.report["changes"]
     (tmp_path / "a.glb").write_bytes(sparse.glb)
     assert validator.errors([tmp_path / "a.glb"]) == [[]]
-
-
-def test_compressed_ones_are_read_again():
-    tree, binary = made_sparse(*files.document([shape(CORNER)]))
-    plain = refined(tree, binary)
-    compressed = refined(*made_sparse(*files.document([shape(CORNER)])), compress="meshopt")
-    again = [
-        subdivide_gltf(each.glb, "glb", Options(scheme="loop", levels=1), None, Limits())
-        for each in (plain, compressed)
-    ]
-    for one, other in zip(*(files.targets_of(each.glb) for each in again), strict=True):
-        for name in NAMES:
-            np.testing.assert_array_equal(one[name], other[name])

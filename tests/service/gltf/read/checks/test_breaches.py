@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError
-from service.gltf.subdivide import subdivide_gltf
-from service.options import Limits, Options
+from tests.service.gltf.read.refused import refine
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
 
 FOUND = "found, and left: "
-
-
-def refine(data):
-    return subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits())
 
 
 def found(made):
@@ -81,12 +76,6 @@ def test_odd_strides_are_read_as_they_say(stride):
     ((pointer, words, count),) = found(made)
     assert (pointer, count) == ("/bufferViews/2/byteStride", 1)
     assert "byteStride" in words
-
-
-@pytest.mark.parametrize("stride", [None, 4, 8, 252])
-def test_even_strides_are_no_breach(stride):
-    made = refine(with_identifiers(stride=stride)[0])
-    assert found(made) == []
 
 
 def first_rows(attributes):

@@ -166,6 +166,11 @@ def test_an_index_beyond_the_vertices_is_refused():
     assert refusal.value.pointer == "/accessors/1"
 
 
+def test_a_strip_of_two_corners_is_refused():
+    with pytest.raises(GltfError, match="2 corners make no triangle"):
+        refine(files.glb([octahedron(indices=np.array([0, 2]), mode=5)]))
+
+
 @pytest.mark.parametrize(("kind", "restart"), [(np.uint8, 255), (np.uint16, 65535)])
 def test_strips_and_fans_with_restarts_are_refused_by_name(kind, restart):
     for mode in (5, 6):
