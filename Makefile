@@ -158,8 +158,8 @@ build/blender-site/.ready: $(DEV)/.ready constraints.txt
 # BPY_PLATFORM names another than this machine's (linux-x64, windows-x64 or macos-arm64), and LIBRARY its wheel.
 addon: addon-5.0
 
-addon-%: $(DEV)/.ready $(BLENDER)-%/.ready
-	$(DEV)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM) $(LIBRARY)
+addon-%: $(RELEASE)/.ready $(BLENDER)-%/.ready
+	$(RELEASE)/bin/python -m addons.blender.build $(BLENDER)-$*/bin/python $(BPY_PLATFORM) $(LIBRARY)
 
 # The newest zip for a version's Python.
 ZIP_FOR = $$(ls -t "$(CURDIR)"/dist/pns_refine-*-$$(basename "$$(readlink -f $(BLENDER)-$(1)/bin/python)").zip | head -1)
@@ -184,9 +184,10 @@ web: web/node_modules/.ready
 web-test: $(DEV)/.ready web/node_modules/.ready
 	cd web && PNS="$(CURDIR)"/$(DEV)/bin/pns node --test --test-concurrency=2 test/*.test.mjs
 
-# README's sheet and the page's example, of shapes made by code; then `make web`.
+# README's sheet, the page's example and the guides' pictures, of shapes made by code; then `make web`.
 pictures: kernels
 	$(DEV)/bin/python docs/picture.py
+	$(DEV)/bin/python docs/few_faces.py
 
 # The pictures of the page, and how fast the page is on this machine.
 web-pictures web-measure: web-%: $(DEV)/.ready web/node_modules/.ready

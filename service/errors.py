@@ -201,3 +201,10 @@ def _restored(kind: type[ServiceError], state: dict[str, object]) -> ServiceErro
 def printable(text: str) -> str:
     """Return a line as a terminal may show it: a file's name or content may hold its commands."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def quoted(data: bytes | memoryview) -> str:
+    """Return a file's first characters, or its first bytes where these are no text."""
+    start = bytes(data[:8])
+    text = start.decode("latin-1")
+    return repr(text) if text.isascii() and text.isprintable() else start.hex(" ")

@@ -203,7 +203,8 @@ DESCRIPTIONS = {
     "tolerance": "refine faces only where they may be farther from the limit surface, by up to "
     f"{MAX_LEVELS} levels: a length in the file's units, or as in 0.1% a share of each mesh's "
     "diagonal. Polygons are cut into triangles",
-    "max_faces": "most faces of each mesh: those farthest from the limit surface are refined first",
+    "max_faces": "most faces of the file: those farthest from the limit surface are refined first. "
+    "Of several meshes in a glTF each has the share that it has before",
     "max_edge_length": "refine faces only where their sides are longer; as tolerance",
 }
 

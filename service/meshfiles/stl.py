@@ -7,7 +7,7 @@ from jaxtyping import Float, Int, UInt16
 
 from pns_common.mesh.rows import cross, norm
 
-from ..errors import UnreadableError
+from ..errors import UnreadableError, quoted
 from ..report import Change
 from .mesh_file import MeshFile, offsets_of
 from .text import cut_text, plain_text
@@ -57,13 +57,13 @@ def _said(data: bytes) -> int:
 
 def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...]]:
     if len(data) < HEADER:
-        raise UnreadableError(f"the STL file has {len(data)} bytes, fewer than its header")
+        raise UnreadableError(f"this is not an STL file: it begins with {quoted(data)}")
     said, count = _said(data), count_facets(data)
     left = len(data) - HEADER - count * FACET.itemsize
     if left and said != count:
         raise UnreadableError(
-            f"the STL file is no text, and no whole binary STL: it says {said} facets and has "
-            f"{count} and {left} bytes"
+            f"the STL file is cut off, or is none: it says {said:,} facets and has room for "
+            f"{count:,}; it begins with {quoted(data)}"
         )
     facet = FACET
     if said != count == int.from_bytes(data[HEADER - 4 : HEADER], "big"):
@@ -108,13 +108,13 @@ def _of_text(
         vertex = vertex[(line < 0) | (vertex >= behind[line])]
     words = vertex[:, None] + np.arange(1, 4)
     if len(vertex) and words[-1, -1] >= len(text.begins):
-        raise UnreadableError("the STL file ends within a facet")
+        raise UnreadableError("the STL file is cut off: it ends within a facet")
     points = text.numbers(words.reshape(-1)).reshape(-1, 3)
     sizes = np.diff(np.searchsorted(vertex, ends), prepend=0)
     rest = data[text.ends[ends[-1]] if len(ends) else 0 :].lower()
     whole = b"solid" in rest
     if sizes.sum() < len(vertex) or (not whole and b"facet" in rest.replace(b"endfacet", b"")):
-        raise UnreadableError("the STL file ends within a facet")
+        raise UnreadableError("the STL file is cut off: it ends within a facet")
     told = "end of the last solid missing: the file may be cut off"
     return points, sizes, () if whole else (Change("", told, 1),)
 

@@ -83,10 +83,13 @@ async function measure({ model }: Result, { model: file }: Source): Promise<void
 function lengths(ours: Result, loop: Result | null, { size, unit }: Scale): Lengths {
   const { model, report } = ours;
   const ofMesh = new Map(report.meshes.map((mesh) => [mesh.index, mesh]));
-  const measured = loop && distances(model, loop.model);
+  const measured = loop && distances(ours, loop);
   return {
     proved: largestLength(model, (index) => ofMesh.get(index)?.limit_distance ?? 0),
     apart: apart.get(model),
+    within: report.meshes.some(({ adaptive }) => adaptive)
+      ? largestLength(model, (index) => ofMesh.get(index)?.adaptive?.distance_max ?? 0)
+      : null,
     measured: measured && measured.max,
     rounding: rounding(model),
     size,

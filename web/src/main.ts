@@ -44,7 +44,7 @@ const session = new Session({
     document.body.classList.toggle("example", upload === example);
     element("advice").hidden = true;
     form.rigged = source.model.meshes.some((mesh) => "isSkinnedMesh" in mesh);
-    form.fit(opened.split);
+    form.fit(opened);
     fileList.show(upload);
     offerFormatOf(upload);
     stage.open(source);
@@ -64,12 +64,12 @@ const session = new Session({
   },
   stayed: (ours) => {
     changed.cancel();
-    form.show(ours.asked, session.source?.opened.split ?? 0);
+    form.show(ours.asked, session.source?.opened);
     remember();
   },
   renewed: (asked) => {
     changed.cancel();
-    form.show(asked, session.source?.opened.split ?? 0);
+    form.show(asked, session.source?.opened);
     remember();
   },
   stopped: ({ name }, again) => {
@@ -89,7 +89,7 @@ const session = new Session({
     document.body.classList.remove("refined", "example");
     document.body.classList.add("empty");
     fileList.show(null);
-    form.fit(0);
+    form.fit();
     stage.arrange();
   },
   discarded: (model) => stage.discard(model),
@@ -107,7 +107,7 @@ stage.view = given.view;
 const fileList = new FileList(takeOne);
 
 /** Return what is asked for a file that was just opened. */
-async function prepare(upload: Upload, { split }: Opened, signal: AbortSignal): Promise<Asked> {
+async function prepare(upload: Upload, opened: Opened, signal: AbortSignal): Promise<Asked> {
   // Which levels are open depends on the service's limits.
   await offered;
   signal.throwIfAborted();
@@ -115,10 +115,10 @@ async function prepare(upload: Upload, { split }: Opened, signal: AbortSignal): 
   // What was set for another file stays with it, unless it is pinned.
   const isOther = session.source !== null && session.source.upload !== upload;
   if (isOther && !input("pin").checked) form.want(DEFAULTS);
-  form.fit(split);
+  form.fit(opened);
   const { refused, asked } = form;
   if (!refused) return asked;
-  form.show(before, session.source?.opened.split ?? 0);
+  form.show(before, session.source?.opened);
   throw fileProblem("The mesh is too large", `${upload.name} would have ${refused}.`);
 }
 

@@ -2,6 +2,8 @@
 
 export interface Settings {
   levels: number;
+  /** The most faces, of which there are more where the surface bends; null: all are split, so often as `levels` says. */
+  faces: number | null;
   /** A model's name; "" for the service's default; "loop" for the classic rule; "scheme:NAME" for another base scheme. */
   model: string;
   /** C, dimensionless; null: the model's own. */
@@ -60,6 +62,7 @@ const WELD = "0.001";
 
 export const DEFAULTS: Settings = {
   levels: 2,
+  faces: null,
   model: "",
   budget: null,
   limit: true,
@@ -90,14 +93,16 @@ export function query(settings: Settings, classic: Classic, writing: Writing = {
     levels: String(settings.levels),
     scheme: base ?? (settings.model ? "pns" : "auto"),
     diagnostics,
-    uv: settings.uv,
+    uv: settings.faces === null ? settings.uv : DEFAULTS.uv,
     crease: settings.crease === "angle" ? `angle:${settings.angle}` : settings.crease,
   });
   if (!base && settings.model) parameters.set("model", settings.model);
   if (!base && settings.budget !== null) parameters.set("budget", String(settings.budget));
-  if (!settings.limit) parameters.set("limit", "false");
+  // Faces of several levels lie on the limit surface, and are triangles.
+  if (settings.faces !== null) parameters.set("max_faces", String(settings.faces));
+  if (!settings.limit && settings.faces === null) parameters.set("limit", "false");
   if (settings.weld) parameters.set("weld_tolerance", WELD);
-  if (settings.polygons) parameters.set("polygons", "auto");
+  if (settings.polygons && settings.faces === null) parameters.set("polygons", "auto");
   if (settings.normals !== "auto") parameters.set("normals", settings.normals);
   if (compress !== "none") parameters.set("compress", compress);
   if (format !== "glb") parameters.set("format", format);
@@ -122,8 +127,9 @@ export function toHash(settings: Settings, view: Record<string, string>): string
 export function fromHash(hash: string): { settings: Settings; view: Record<string, string> } {
   const given = Object.fromEntries(new URLSearchParams(hash.replace(/^#/, "")));
   const settings = { ...DEFAULTS };
-  const { levels, model, budget, limit, crease, angle, uv, weld, polygons, normals, ...view } = given;
+  const { levels, faces, model, budget, limit, crease, angle, uv, weld, polygons, normals, ...view } = given;
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
+  settings.faces = whole(faces, 1, Infinity);
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
   settings.limit = limit !== "false";

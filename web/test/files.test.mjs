@@ -88,6 +88,33 @@ describe("files on the page", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.deepEqual(corners, Array(7).fill(4));
   });
 
+  test("files are shown as the service reads them", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    const corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n";
+    const words = (...values) => Buffer.concat(values.map((value) => {
+      const word = Buffer.alloc(4);
+      return word.writeInt32BE(value) && word;
+    }));
+    const floats = Buffer.alloc(36);
+    [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((value, at) => floats.writeFloatBE(value, 4 * at));
+    for (const [name, file, faces, vertices] of [
+      ["continued.obj", `${corners}f 1 2 \\ \n3 4\nf 1 2 5\n`, 2, "5"],
+      ["old.obj", `${corners}usemtl a#1\nfo 1 2 3\nf 1 2 5\n`.replaceAll("\n", "\r"), 2, "5"],
+      ["wide.obj", Buffer.from(`\ufeff${corners}f 1 2 3\nf 1 2 5\n`, "utf16le"), 2, "5"],
+      ["partly.obj", `${corners}vt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1 2 5\n`, 2, "6"],
+      ["binary.off", Buffer.concat([Buffer.from("OFF BINARY\n"), words(3, 1, 0), floats, words(3, 0, 1, 2, 0)]), 1, "3"],
+      ["glued.off", "OFF3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", 1, "3"],
+    ]) {
+      await choose(page, { name, mimeType: "", buffer: Buffer.from(file) });
+      await page.locator("#file-name", { hasText: name }).waitFor();
+      await settled(page);
+      assert.match(await page.textContent("#label-left"), new RegExp(`Before${faces} face`), name);
+      const before = await page.textContent("#statistics tr:has-text('Vertices in the file') td");
+      assert.equal(before, vertices, name);
+      assert.ok(await page.isHidden("#problem"), name);
+    }
+  });
+
   test("a broken file gets words, and the model that was there stays", async () => {
     const page = await visit({ hash: "#levels=1", expected: [422] });
     await choose(page, example);

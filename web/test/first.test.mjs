@@ -157,11 +157,11 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.match(page.url(), /polygons=true/);
   });
 
-  test("each setting but the angle explains itself to the pointer and to the keyboard", async () => {
+  test("each setting in view explains itself to the pointer and to the keyboard", async () => {
     const page = await visit();
     await page.evaluate(() => document.querySelectorAll("details").forEach((part) => (part.open = true)));
     const controls = await page.$$eval(":is(#settings, #research) .row :is(select, input)", (all) =>
-      all.filter(({ id }) => id !== "angle").map(({ id }) => `#${id}`),
+      all.filter((control) => control.getClientRects().length).map(({ id }) => `#${id}`),
     );
     assert.ok(controls.length >= 7, String(controls));
     await page.locator("#strength:enabled").waitFor();
@@ -391,21 +391,49 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
     assert.ok(shadow > 1000, `${shadow} pixels of shadow`);
   });
 
-  test("of a rigged file with many faces the form says what a step less gives", async () => {
+  test("of a rigged file with many faces a click asks for fewer, where the surface bends", async () => {
     const page = await visit({ hash: "#levels=3" });
-    const release = await hold(page);
-    const note = () => page.textContent("#levels-note");
+    const release = await hold(page, (_, url) => !/max_faces/.test(url));
     await choose(page, { ...example, buffer: rigged(example.buffer) });
     await page.locator("#levels-note", { hasText: "Many faces for a game" }).waitFor();
-    assert.equal(await note(), `Many faces for a game: 1 gives ${number(4 * PART_FACES)}.`);
+    assert.equal(await page.textContent("#offer"), "Only where it bends: at most 5,000 faces");
+    await page.click("#offer");
+    assert.equal(await page.textContent("#detail-text"), "≤ 5,000");
+    assert.ok(await page.isHidden("#offer"));
+    await settled(page);
+    const [, faces] = /Only where it bends · ([\d,]+) faces/.exec(await page.textContent("#label-right"));
+    assert.ok(Number(faces.replace(",", "")) > 4900 && Number(faces.replace(",", "")) <= 5000, faces);
+    assert.match(await page.textContent("#promises"), /Faces where it bends/);
+    assert.match(await page.evaluate(() => location.hash), /faces=5000/);
     await page.selectOption("#levels", "1");
-    assert.equal(await note(), "");
+    assert.ok(await page.isHidden("#detail"));
     await page.selectOption("#levels", "3");
     await choose(page, { ...example, name: "still.glb" });
     await page.locator("#file-name", { hasText: "still.glb" }).waitFor();
-    assert.equal(await note(), "");
+    assert.ok(await page.isHidden("#offer"));
+    assert.equal(await page.textContent("#levels-note"), "");
     await page.click("#cancel");
     release();
+  });
+
+  test("detail is the most faces of the result; polygons have none, and the list says why", async () => {
+    const page = await visit({ hash: "#levels=1&limit=false&uv=smooth" });
+    await choose(page, CUBE_OF_TRIANGLES);
+    await settled(page);
+    await page.selectOption("#levels", "bends");
+    await page.locator("#label-right", { hasText: "Only where it bends" }).waitFor();
+    await page.fill("#detail", "3");
+    assert.equal(await page.getAttribute("#detail", "aria-valuetext"), "at most 200 faces");
+    await page.locator("#label-right", { hasText: /1[5-9]\d faces|200 faces/ }).waitFor();
+    assert.ok(await page.isDisabled("#uv"));
+    await page.focus("#detail");
+    await page.keyboard.press("Shift");
+    await page.locator(".row:has(#detail) .tip").waitFor();
+    await choose(page, CUBE);
+    await page.locator("#file-name", { hasText: CUBE.name }).waitFor();
+    await settled(page);
+    assert.equal(await page.textContent('#levels option[value="bends"]'), "Only where it bends: for triangles");
+    assert.ok(await page.locator('#levels option[value="bends"]').isDisabled());
   });
 
   test("lengths are in per cent of the model's size first, and the file's unit second", async () => {

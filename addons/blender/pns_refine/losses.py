@@ -118,7 +118,8 @@ def subdividing_modifiers(obj: bpy.types.Object) -> list[str]:
 def irregularities(refined: Refined) -> list[str]:
     """Return what was found of the mesh when it was refined."""
     said = []
-    edges = refined.report["levels"][0]["edges"]["irregular"]
+    levels = refined.report["levels"]
+    edges = levels[0]["edges"]["irregular"] if levels else 0
     if edges:
         said.append(f"{edges:,} edges join more than two faces, or turned ones, and are sharp")
     split = refined.split_vertices

@@ -16,7 +16,7 @@ from .losses import subdividing_modifiers
 from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of, keeps_polygons
-from .words import forecast, listed, too_many
+from .words import adaptive_forecast, forecast, listed, too_many
 from .writing import take_name
 
 # Above so many faces the work goes on beside the interface, and there is no redo panel.
@@ -35,7 +35,12 @@ PASSED_ON = {
 
 
 def made_count(objects: list[bpy.types.Object], settings: Settings) -> int:
-    """Return how many faces there will be."""
+    """Return how many faces there will be, at most where that is what is asked for.
+
+    A tolerance counts as whole levels.
+    """
+    if settings.detail == "FACES":
+        return settings.max_faces * len(objects)
     made, whole = 0, keeps_polygons(settings)
     for obj in objects:
         corners, faces = len(obj.data.loops), len(obj.data.polygons)
@@ -300,7 +305,13 @@ def draw_forecast(
     """Show how many faces there will be, whether that is wise, and what subdivides them again."""
     made = made_count(objects, settings)
     faces = sum(len(o.data.polygons) for o in objects)
-    layout.label(text=forecast(faces, made), icon="INFO")
+    if settings.detail == "LEVELS":
+        text = forecast(faces, made)
+    elif any(len(o.data.loops) != 3 * len(o.data.polygons) for o in objects):
+        text = "Detail is for triangles: quads are cut everywhere"
+    else:
+        text = adaptive_forecast(faces, made if settings.detail == "FACES" else None)
+    layout.label(text=text, icon="INFO")
     warning = too_many(made)
     if warning:
         layout.label(text=warning, icon="ERROR")

@@ -8,6 +8,7 @@ from . import live
 from .operator import OBJECT_OT_pns_refine, chosen_objects, draw_forecast, draw_subdivided
 from .overlay import TITLES, current, ramp_of, shown_mesh
 from .result import certificate_lines, in_units, largest_scale, note_lines
+from .settings import GOAL_OF
 
 
 class _Panel:
@@ -26,7 +27,8 @@ class VIEW3D_PT_pns(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
         layout = self.layout
         layout.operator(OBJECT_OT_pns_refine.bl_idname, icon="MOD_SUBSURF")
         last = context.window_manager.operator_properties_last(OBJECT_OT_pns_refine.bl_idname)
-        layout.prop(last, "levels")
+        layout.prop(last, "detail")
+        layout.prop(last, GOAL_OF[last.detail])
         if context.object is not None and chosen_objects(context):
             draw_forecast(layout, chosen_objects(context), last)
 

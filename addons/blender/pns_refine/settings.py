@@ -17,6 +17,8 @@ from .refining.compute import Choice
 from .refining.snapshot import Smoothing
 
 NO_ANGLE = math.pi
+# The property that each choice of detail asks for.
+GOAL_OF = {"LEVELS": "levels", "FACES": "max_faces", "TOLERANCE": "tolerance"}
 # Rules of boundaries by the names of Blender's Subdivision Surface.
 BORDERS = {"ALL": "smooth", "PRESERVE_CORNERS": "corners"}
 # Since 5.0 a path says whether it may begin at the folder of the file, "//".
@@ -52,6 +54,44 @@ def _model_changed(settings: bpy.types.bpy_struct, context: bpy.types.Context) -
 class Settings:
     """The properties; a class with them is registered with Blender as an operator or a group."""
 
+    detail: EnumProperty(
+        name="Detail",
+        description="Where faces are cut",
+        items=(
+            ("LEVELS", "Everywhere", "Each face as often as Levels says"),
+            (
+                "FACES",
+                "Faces at Most",
+                "Where the surface bends most, up to a number of faces. For triangles",
+            ),
+            (
+                "TOLERANCE",
+                "Tolerance",
+                "Where faces would be farther from the smooth surface than "
+                "a share of the mesh's size. For triangles",
+            ),
+        ),
+        default="LEVELS",
+    )
+    max_faces: IntProperty(
+        name="Faces at Most",
+        description="The most faces of each mesh; at least as many as it has",
+        default=20_000,
+        min=1,
+        soft_min=100,
+        soft_max=1_000_000,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How far faces may be from the smooth surface, as a share of the diagonal of "
+        "the mesh's box",
+        subtype="PERCENTAGE",
+        default=0.1,
+        min=0.001,
+        soft_max=5.0,
+        max=100.0,
+        precision=3,
+    )
     levels: IntProperty(
         name="Levels",
         description="How often each face is cut: polygons into quads, triangles into four",
@@ -141,7 +181,8 @@ class Settings:
 
     def draw_settings(self, layout: bpy.types.UILayout) -> None:
         """Show the properties."""
-        layout.prop(self, "levels")
+        layout.prop(self, "detail")
+        layout.prop(self, GOAL_OF[self.detail])
         layout.prop(self, "scheme")
         column = layout.column()
         column.enabled = self.scheme == "PNS"
@@ -179,4 +220,6 @@ def choice_of(settings: Settings) -> Choice:
         crease_lines=settings.crease_lines,
         border=BORDERS[settings.border],
         uv_smooth=Smoothing(settings.uv_smooth),
+        tolerance=f"{settings.tolerance}%" if settings.detail == "TOLERANCE" else None,
+        max_faces=settings.max_faces if settings.detail == "FACES" else None,
     )

@@ -13,6 +13,12 @@ def forecast(faces: int, made: int) -> str:
     return f"{made:,} faces from {faces:,}"
 
 
+def adaptive_forecast(faces: int, most: int | None) -> str:
+    """Tell how many faces there will be where the surface bends alone."""
+    made = "As many faces as that takes" if most is None else f"At most {most:,} faces"
+    return f"{made}, from {faces:,}"
+
+
 def too_many(made: int) -> str | None:
     """Return a warning where there will be more faces than work well."""
     if made <= MANY:
@@ -24,7 +30,9 @@ def certificate(
     report: dict[str, Any], farthest: float, length: Callable[[float], str]
 ) -> list[str]:
     """Tell what a report promises and measured; ``length`` words a length in the mesh's units."""
-    levels = report["levels"]
+    levels, adaptive = report["levels"], report.get("adaptive")
+    if adaptive is not None:
+        return _of_goal(report, adaptive, length)
     steps = f"{len(levels)} level" + ("s" if len(levels) > 1 else "")
     if report["scheme"] == "loop":
         return [f"{steps} of Loop, without correction"]
@@ -39,6 +47,17 @@ def certificate(
     flipped = sum(level["flipped_faces"] for level in levels)
     lines.append("No face is flipped" if not flipped else f"{flipped:,} faces are flipped")
     return lines
+
+
+def _of_goal(
+    report: dict[str, Any], adaptive: dict[str, Any], length: Callable[[float], str]
+) -> list[str]:
+    rule = "Loop" if report["scheme"] == "loop" else f"PNS, model {report['model']}"
+    return [
+        f"{adaptive['faces']:,} faces where the surface bends, by {rule}",
+        "No point of the smooth surface is farther",
+        f"from the face under it than {length(adaptive['distance_max'])}",
+    ]
 
 
 def listed(names: Sequence[str], most: int = 4) -> str:

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from ...bodies.media import GLB_MAGIC, begins_as_json
-from ...errors import GltfError, UnreadableError, check_limit
+from ...errors import GltfError, UnreadableError, check_limit, quoted
 from ...options import BYTES_PER_INPUT_BYTE, Limits
 from ..constants import BIN_CHUNK, GLB_VERSION, JSON_CHUNK, WIDEST
 
@@ -207,7 +207,7 @@ def read_glb(data: bytes | memoryview) -> Container:
         raise UnreadableError("the file is shorter than a GLB header")
     magic, version, length = _HEADER.unpack_from(data)
     if magic != GLB_MAGIC:
-        raise UnreadableError(f"this is not a glTF file: it begins with {_quoted(data)}")
+        raise UnreadableError(f"this is not a glTF file: it begins with {quoted(data)}")
     if version != GLB_VERSION:
         raise UnreadableError(f"GLB version {version}, expected {GLB_VERSION}")
     if not _HEADER.size <= length <= len(data):
@@ -221,13 +221,6 @@ def read_glb(data: bytes | memoryview) -> Container:
     binary = rest[0][1] if rest and rest[0][0] == BIN_CHUNK else None
     others = rest if binary is None else rest[1:]
     return Container(bytes(chunks[0][1]), binary, tuple(others), len(data) - length)
-
-
-def _quoted(data: bytes | memoryview) -> str:
-    """Return a file's first characters, or its first bytes where these are no text."""
-    start = bytes(data[:8])
-    text = start.decode("latin-1")
-    return repr(text) if text.isascii() and text.isprintable() else start.hex(" ")
 
 
 def write_glb(

@@ -16,6 +16,7 @@ from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, count_bends
 from ...course import Course
+from ...errors import InvalidParameter
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Limits, Options
@@ -75,12 +76,19 @@ def refined_meshes(
     """
     shares = stage_shares(scheme, options)
     total, done = sum(plan.faces for plan in plans), 0
+    most = options.max_faces
+    if most is not None and len(plans) > 1 and most < total:
+        least = f"must be at least {total}: faces are split, never joined"
+        raise InvalidParameter("max_faces", f"max_faces is {most}; it {least}")
     chosen = chosen_primitives(upload, options)
-    for window in _windows(plans, options.levels):
+    # Each mesh has its share of `max_faces`.
+    windows = _windows(plans, options.levels) if most is None else ([plan] for plan in plans)
+    for window in windows:
         count = sum(plan.faces for plan in window)
+        own = options if most is None else replace(options, max_faces=most * count // total)
         with course.part(done / total, (done + count) / total):
             yield from _window(
-                upload, window, scheme, options, course, shares, chosen, limits, traced=traced
+                upload, window, scheme, own, course, shares, chosen, limits, traced=traced
             )
         done += count
 

@@ -54,6 +54,9 @@ WRONG: list[tuple[str, str | bytes, str]] = [
     ("ply", b"OFF\n", "this is not a PLY"),
     ("stl", bytes(80) + b"\xff\xff\xff\xff", "STL"),
     ("stl", "solid\nfacet\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n", "STL"),
+    ("stl", b"<html>", "not an STL file: it begins with '<html>'"),
+    ("stl", bytes(80) + b"\x09\0\0\0" + bytes(60), "cut off, or is none: it says 9 facets"),
+    ("stl", "solid\nfacet\nvertex 0 0 0\n", "cut off: it ends within a facet"),
     (
         "stl",
         "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nfacet normal 0 0\n",

@@ -17,8 +17,9 @@ export function readObj(source: string): BufferGeometry {
   // For each material, pairs of a vertex and its texture coordinates; −1 where a corner has none.
   const corners = new Map<string, [number, number][]>();
   let material = "";
-  const lines = source.replace(/#.*/g, "").replace(/\\\r?\n/g, " ");
-  for (const [, kind, rest] of lines.matchAll(/^[ \t]*(v|vt|f|usemtl|mtllib)[ \t]+(.+)$/gm)) {
+  // A # may be part of a name.
+  const lines = source.replace(/(^|[ \t])#.*/gm, "").replace(/\\[ \t]*\n/g, " ");
+  for (const [, kind, rest] of lines.matchAll(/^[ \t]*(v|vt|fo?|usemtl|mtllib)[ \t]+(.+)$/gm)) {
     const words = rest!.trim().split(/\s+/);
     if (kind === "v") points.push(Number(words[0]), Number(words[1]), Number(words[2]));
     else if (kind === "vt") places.push(Number(words[0]), Number(words[1] ?? 0));
@@ -39,7 +40,7 @@ export function readObj(source: string): BufferGeometry {
   if (all.some(([vertex]) => !(vertex >= 0 && 3 * vertex < points.length))) {
     throw new Error("a face names a vertex that it does not have");
   }
-  const isMapped = all.every(([, place]) => place >= 0 && 2 * place < places.length);
+  const isMapped = all.some(([, place]) => place >= 0 && 2 * place < places.length);
   const geometry = isMapped ? mapped(points, places, all) : plain(points, all);
   let first = 0;
   for (const [number, triangles] of [...corners.values()].entries()) {
@@ -73,7 +74,8 @@ function mapped(points: number[], places: number[], corners: [number, number][])
     if (known === made.size) {
       made.set(key, known);
       position.push(...points.slice(3 * vertex, 3 * vertex + 3));
-      uv.push(...places.slice(2 * place, 2 * place + 2));
+      // Corners without any take no others' away.
+      uv.push(places[2 * place] ?? 0, places[2 * place + 1] ?? 0);
     }
     return known;
   });

@@ -4,6 +4,7 @@
  */
 
 import { Box3, Matrix4, Vector3, type BufferAttribute, type Mesh, type SkinnedMesh } from "three";
+import type { Result } from "../result";
 import type { Model } from "../view/model";
 import { corners } from "./weld";
 
@@ -14,7 +15,9 @@ export interface Field {
 }
 
 /** Distances in the scene's units; null where the two are no counterparts. */
-export function distances(ours: Model, loop: Model): Field | null {
+export function distances({ model: ours, asked }: Result, { model: loop }: Result): Field | null {
+  // Where faces are made as they are needed, each side has its own.
+  if (asked.settings.faces !== null) return null;
   if (ours.meshes.length !== loop.meshes.length) return null;
   const values: Float32Array[] = [];
   let max = 0;

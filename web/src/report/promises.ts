@@ -18,6 +18,8 @@ export interface Lengths {
   proved: number;
   /** How far the result and the user's own model are apart; null where it cannot be told; undefined until it is known. */
   apart: Closeness | null | undefined;
+  /** How far faces made where they are needed are from the smooth surface at most, as the report proves it; null for others. */
+  within: number | null;
   /** The largest distance between a vertex and its counterpart by the classic rule; null until that side is there. */
   measured: number | null;
   /** The possible error of `measured`. */
@@ -30,7 +32,7 @@ export interface Lengths {
 }
 
 export function promises(report: Report, lengths: Lengths): Promised[] {
-  if (!report.levels.length) {
+  if (!report.levels.length && lengths.within === null) {
     const text = "The file has no triangle mesh.";
     return [{ holds: false, title: "Nothing was refined", text, mathematics: "" }];
   }
@@ -39,6 +41,7 @@ export function promises(report: Report, lengths: Lengths): Promised[] {
     ...(learned
       ? [closeness(report, lengths), folding(report, lengths), flatness(report, lengths)]
       : [classic(lengths)]),
+    ...flatEnough(lengths),
   ];
 }
 
@@ -77,6 +80,18 @@ function closeness(report: Report, lengths: Lengths): Promised {
       `Each vertex may leave its place by ${rule}’s rule by C h² / R at most, whatever the model says; ` +
       `at most ${percent(Math.min(used, 1))} of that was used.`,
   };
+}
+
+function flatEnough({ within, size, unit }: Lengths): Promised[] {
+  if (within === null) return [];
+  return [
+    {
+      holds: true,
+      title: "Faces where it bends",
+      text: `No point of the smooth surface is farther from the face under it than ${percent(within / size)} of the model’s size.`,
+      mathematics: `No point of the limit surface over a face is farther than ${length(within, unit)} from the face’s plane.`,
+    },
+  ];
 }
 
 function folding(report: Report, { rule }: Lengths): Promised {

@@ -42,6 +42,8 @@ export interface MeshReport {
   learned_levels: number;
   /** No point of the limit surface is farther from the classic rule's, in the mesh's own units. */
   limit_distance: number;
+  /** Of faces made where they are needed: none is farther from the surface over it, in the mesh's own units. */
+  adaptive?: { distance_max: number };
 }
 
 /** Whether a model took part. */

@@ -37,7 +37,7 @@ function labels(
   const rule = ({ report }: Result): string => (isClassic(report.base) ? "Classic" : nameOf(report.base));
   const refined = ours && {
     title: "After",
-    more: `${ours.report.model ? `Smoothness ${ours.report.levels.length}` : rule(ours)} · `,
+    more: `${!ours.report.model ? rule(ours) : ours.asked.settings.faces === null ? `Smoothness ${ours.report.levels.length}` : "Only where it bends"} · `,
     text: of(ours),
   };
   const before = source && { title: "Before", text: counted(source.opened.faces, "face") };

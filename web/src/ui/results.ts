@@ -76,7 +76,8 @@ export function showStatistics(before: Before, report: Report, size: number): vo
     ["Vertices in the file", count(before.vertices), count(report.totals.vertices)],
     ["File", bytes(before.bytes), bytes(size)],
   ];
-  if (last) {
+  // The levels of faces made where they are needed are no whole meshes.
+  if (last && !report.meshes.some(({ adaptive }) => adaptive)) {
     const sharp = sharpEdges(last);
     rows.push(
       ["Vertices of the surface", count(surface.vertices), count(last.vertices)],

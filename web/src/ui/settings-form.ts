@@ -1,13 +1,24 @@
 /** The form of settings: what may be chosen for this file, on this service. */
 
 import type { Limits, ModelEntry } from "../api/client";
-import { count } from "../report/format";
+import type { Opened } from "../files/open";
+import { count, counted } from "../report/format";
 import { DEFAULTS, isClassic, learns, LOOP, SCHEME, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
 import { describeModel, ruleName } from "./models";
 
 /** Faces of a rigged file from which on it is heavy. */
 const HEAVY = 50_000;
+/** In the list of levels: faces only where the surface bends. */
+const BENDS = "bends";
+/** Round numbers of faces: 10 to 5 million. */
+const STOPS = [10, 100, 1e3, 1e4, 1e5, 1e6].flatMap((ten) => [ten, 2 * ten, 5 * ten]);
+/** The most faces of one that the slider offers: those of five steps. */
+const FINEST = 4 ** 5;
+
+/** What counts of a file. */
+type Faces = Pick<Opened, "split" | "polygons">;
+const NO_FACES: Faces = { split: 0, polygons: false };
 
 export class SettingsForm {
   private models: ModelEntry[] = [];
@@ -16,8 +27,7 @@ export class SettingsForm {
   private wanted: Settings;
   /** The same, with the levels that the file and the service leave open. */
   private settings: Settings;
-  /** Faces after one step; 0 where there is no file. */
-  private split = 0;
+  private file = NO_FACES;
   /** Whether the file moves by joints: games count its faces. */
   rigged = false;
 
@@ -37,6 +47,11 @@ export class SettingsForm {
     };
     form.addEventListener("input", read);
     input("strength").addEventListener("input", read);
+    element("offer").addEventListener("click", () => {
+      select("levels").value = BENDS;
+      this.read(select("levels"));
+      select("levels").focus();
+    });
     this.write();
   }
 
@@ -61,19 +76,20 @@ export class SettingsForm {
 
   want(wanted: Settings): void {
     this.wanted = { ...wanted };
-    this.fit(this.split);
+    this.fit(this.file);
   }
 
-  /** Close the levels that would make a file too large, which has so many faces after one step. */
-  fit(split: number): void {
-    this.show({ settings: this.wanted, wanted: this.wanted }, split);
+  /** Close the levels that would make a file too large. */
+  fit(file: Faces = NO_FACES): void {
+    this.show({ settings: this.wanted, wanted: this.wanted }, file);
   }
 
-  /** Show what was asked for a file, which has so many faces after one step. */
-  show(asked: Asked, split: number): void {
+  /** Show what was asked for a file. */
+  show(asked: Asked, file: Faces = NO_FACES): void {
     this.wanted = { ...asked.wanted };
     this.settings = { ...asked.settings };
-    this.split = split;
+    this.file = file;
+    if (this.settings.faces !== null) this.settings.faces = this.nearestStop(this.settings.faces);
     const deepest = this.levels().filter((level) => !this.refusal(level));
     this.settings.levels = Math.min(this.settings.levels, deepest.at(-1) ?? 1);
     this.write();
@@ -85,7 +101,19 @@ export class SettingsForm {
   }
 
   private predicted(level: number): number {
-    return this.split * 4 ** (level - 1);
+    return this.file.split * 4 ** (level - 1);
+  }
+
+  /** Numbers of faces that the slider offers; none where faces of several levels cannot be. */
+  private get stops(): number[] {
+    const faces = this.file.split / 4 || 1000;
+    const most = Math.min(this.limits?.faces ?? Infinity, FINEST * faces);
+    return this.file.polygons ? [] : STOPS.filter((stop) => stop >= faces && stop <= most);
+  }
+
+  /** Return the largest stop that is no more than a number of faces; the first where there is none. */
+  private nearestStop(faces: number): number | null {
+    return this.stops.findLast((stop) => stop <= faces) ?? this.stops[0] ?? null;
   }
 
   /** Say why a level is closed; empty where it is open. */
@@ -107,15 +135,18 @@ export class SettingsForm {
   }
 
   private write(): void {
-    const { settings } = this;
+    const { settings, stops } = this;
     select("levels").replaceChildren(
       ...this.levels().map((level) => {
-        const faces = this.split ? ` · ${count(this.predicted(level))} faces` : "";
+        const faces = this.file.split ? ` · ${count(this.predicted(level))} faces` : "";
         const isClosed = this.refusal(level) !== "";
         return option(String(level), isClosed ? `${level} · too many faces` : `${level}${faces}`, isClosed);
       }),
+      option(BENDS, `Only where it bends${this.file.polygons ? ": for triangles" : ""}`, !stops.length),
     );
-    select("levels").value = String(settings.levels);
+    select("levels").value = settings.faces === null ? String(settings.levels) : BENDS;
+    input("detail").max = String(Math.max(stops.length - 1, 0));
+    input("detail").value = String(stops.indexOf(settings.faces ?? this.nearestStop(this.file.split) ?? 0));
     const bundled = this.models.map((model) =>
       option(model.default ? "" : model.name, ruleName(model)),
     );
@@ -139,11 +170,13 @@ export class SettingsForm {
   /** Read the form after a change of `target`. */
   private read(target: EventTarget | null): void {
     const before = this.settings;
+    const bends = select("levels").value === BENDS;
     const angle = input("angle");
     const own = this.model?.budget ?? 0;
     const share = Number(input("strength").value) / 100;
     const settings: Settings = {
-      levels: Number(select("levels").value),
+      levels: bends ? before.levels : Number(select("levels").value),
+      faces: bends ? this.stops[Number(input("detail").value)] ?? null : null,
       model: select("model").value,
       // A link may hold any number: it stays until the strength itself is moved.
       budget: target !== input("strength") ? before.budget : share === 1 ? null : share * own,
@@ -168,10 +201,19 @@ export class SettingsForm {
   private adjust(): void {
     const { settings, model } = this;
     const closed = this.levels().find((level) => this.refusal(level));
-    const isHeavy = this.rigged && settings.levels > 1 && this.predicted(settings.levels) > HEAVY;
-    element("levels-note").textContent = closed && this.wanted.levels >= closed
+    const bends = settings.faces !== null;
+    const isHeavy = !bends && this.rigged && settings.levels > 1 && this.predicted(settings.levels) > HEAVY;
+    element("levels-note").textContent = closed && !bends && this.wanted.levels >= closed
       ? `${closed} and more: ${this.refusal(closed)} of this service`
-      : isHeavy ? `Many faces for a game: 1 gives ${count(this.predicted(1))}.` : "";
+      : isHeavy ? "Many faces for a game." : "";
+    const offer = isHeavy && this.nearestStop(this.file.split);
+    element("offer").hidden = !offer;
+    element("offer").textContent = offer ? `Only where it bends: at most ${counted(offer, "face")}` : "";
+    element("detail-row").hidden = !bends;
+    element("detail-text").textContent = bends ? `≤ ${count(settings.faces!)}` : "";
+    input("detail").ariaValueText = bends ? `at most ${counted(settings.faces!, "face")}` : "";
+    for (const id of ["limit", "polygons"]) input(id).disabled = bends;
+    select("uv").disabled = bends;
     const share = settings.budget === null || !model ? 1 : settings.budget / model.budget;
     const percent = Math.round(100 * share);
     input("strength").value = String(percent);

@@ -189,6 +189,10 @@ export class Stage {
     const learned = ours && isLearned(ours.report);
     // One side alone is compared with nothing; over the result stand the control mesh's edges.
     select("pair").disabled = !learned || this.layout === "overlay" || this.layout === "single";
+    // Faces that are made where they are needed have no counterparts, and no values.
+    for (const choice of select("look").options) {
+      choice.disabled = ours?.asked.settings.faces != null && ["distance", "gate", "ratio"].includes(choice.value);
+    }
     // Until Loop's side has come the control mesh stands in its place, under its own name.
     const byLoop = select("pair").value === "loop" && learned && loop !== null;
     const left = (byLoop ? loop.model : source?.model) ?? null;

@@ -79,7 +79,7 @@ function field(heat: Heat, ours: Result, loop: Result | null): Field | null {
   if (isZero(heat, ours)) return zeros(ours.model);
   switch (heat) {
     case "distance":
-      return loop && distances(ours.model, loop.model);
+      return loop && distances(ours, loop);
     case "dihedral":
       return dihedrals(ours.model);
     default:

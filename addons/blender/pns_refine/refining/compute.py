@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -27,7 +29,7 @@ from pns_common.parallel import Blocks, available_threads
 
 from .hidden import hide_within
 from .positions import Positions, refine_positions
-from .shading import shaded
+from .shading import corner_normals, shaded
 from .shown_creases import shown_creases
 from .snapshot import Control, Faces, Layer, Refined, Rule, Smoothing, Snapshot, edge_keys
 from .steps import Steps, edge_numbers, level_steps, refine_columns
@@ -52,7 +54,8 @@ class Choice:
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
     none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
     card asks for it. ``border`` is the rule of boundaries, as in ``pns_common.Creases``.
-    ``uv_smooth`` is for UV maps.
+    ``uv_smooth`` is for UV maps. ``tolerance`` (as of ``pns_common.refine``) or ``max_faces`` make
+    faces only where the surface bends, and ``levels`` has no effect.
     """
 
     model: Model | None
@@ -63,6 +66,14 @@ class Choice:
     crease_lines: bool = True
     border: str = "smooth"
     uv_smooth: Smoothing = Smoothing.PRESERVE_BOUNDARIES
+    tolerance: str | None = None
+    max_faces: int | None = None
+
+    @property
+    def goals(self) -> dict[str, Any]:
+        """Goals of faces of several levels, as arguments of the library's refine."""
+        given = {"tolerance": self.tolerance, "max_faces": self.max_faces}
+        return {name: goal for name, goal in given.items() if goal is not None}
 
 
 def compute(
@@ -112,7 +123,8 @@ def compute(
         layers.append(layer.of(carry(layer)))
         bar.reach("corners", (number + 1) / len(snapshot.layers))
     smooth = choice.crease_lines and scheme.creases.finds
-    layers = shaded(layers, steps, positions, len(loose), smooth=smooth)
+    normals = None if positions.normals is None else partial(corner_normals, steps, positions)
+    layers = shaded(layers, steps.at_last.is_sharp, len(loose), normals, smooth=smooth)
     edges = np.concatenate([steps.final.edges, snapshot.edges[loose]])
     old, count = len(snapshot.points), len(positions.points)
     vertex_sharpness = np.zeros(count)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -20,15 +20,21 @@ SHARP_EDGE, SHARP_FACE = "sharp_edge", "sharp_face"
 
 
 def shaded(
-    layers: Sequence[Layer], steps: Steps, positions: Positions, loose: int, *, smooth: bool
+    layers: Sequence[Layer],
+    sharp: Bool[np.ndarray, " E"],
+    loose: int,
+    normals: Callable[[Bool[np.ndarray, " E"]], Float[np.ndarray, "C 3"]] | None,
+    *,
+    smooth: bool,
 ) -> list[Layer]:
     """Return the layers of a result with its shading; ``loose`` edges have no faces.
 
     Edges that are sharp on the surface are marked beside those of the mesh. ``smooth`` takes the
     marks of flat faces away, which are edges by then; where all faces are flat they go in any
-    case. A mesh without normals of its own gets those of the limit surface, if it lies on that.
+    case. A mesh without normals of its own gets those of the limit surface, if it lies on that:
+    ``normals`` gives those of corners, one-sided along the edges that are sharp.
     """
-    sharp = np.r_[steps.at_last.is_sharp, np.zeros(loose, dtype=bool)]
+    sharp = np.r_[sharp, np.zeros(loose, dtype=bool)]
     made: list[Layer] = []
     for layer in layers:
         if layer.name == SHARP_FACE and (smooth or layer.values.all()):
@@ -41,15 +47,15 @@ def shaded(
         flags = sharp[:, None]
         made.append(Layer(SHARP_EDGE, "BOOLEAN", Domain.EDGE, Rule.KEEP, flags))
     flat = any(layer.name == SHARP_FACE for layer in made)
-    if positions.normals is not None and not flat and all(x.kind != "NORMAL" for x in made):
-        made.append(NORMALS.of(_corner_normals(steps, positions, sharp[: len(sharp) - loose])))
+    if normals is not None and not flat and all(x.kind != "NORMAL" for x in made):
+        made.append(NORMALS.of(normals(sharp[: len(sharp) - loose])))
     return made
 
 
-def _corner_normals(
+def corner_normals(
     steps: Steps, positions: Positions, sharp: Bool[np.ndarray, " E"]
 ) -> Float[np.ndarray, "C 3"]:
-    """Return the limit surface's normal at each corner, one-sided along sharp edges."""
+    """Return the limit surface's normal at each corner of whole levels, one-sided along edges."""
     blocks = Blocks(available_threads())
     topology = steps.at_last.with_creases(np.flatnonzero(sharp))
     found = limit_normals(positions.controls, topology, blocks, steps.base)

@@ -17,7 +17,7 @@ class Large(operator.Refining):
         self.levels, self.scheme, self.model, self.model_file = 2, "PNS", "general", ""
         self.budget, self.limit, self.crease_angle, self.border = 0.5, True, 10.0, "ALL"
         self.crease_lines, self.keep_original, self.beside = True, True, True
-        self.uv_smooth = "PRESERVE_BOUNDARIES"
+        self.uv_smooth, self.detail = "PRESERVE_BOUNDARIES", "LEVELS"
         self.said = []
         for name, value in settings.items():
             setattr(self, name, value)

@@ -52,6 +52,21 @@ def test_the_forecast_stands_below_the_button():
     assert any("96 faces from 6" in line for line in lines)
 
 
+def test_detail_tells_the_most_faces_and_what_quads_lack():
+    cube()
+    last = bpy.context.window_manager.operator_properties_last("object.pns_refine")
+    last.detail = "FACES"
+    lines = drawn(panel.VIEW3D_PT_pns)
+    assert "max_faces" in lines
+    assert any("quads are cut everywhere" in line for line in lines)
+    grid(2)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.quads_convert_to_tris()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert any("At most 20,000 faces, from 8" in line for line in drawn(panel.VIEW3D_PT_pns))
+    last.detail = "LEVELS"
+
+
 def test_a_million_faces_are_warned_of():
     grid(300)
     last = bpy.context.window_manager.operator_properties_last("object.pns_refine")

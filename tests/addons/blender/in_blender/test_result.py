@@ -9,6 +9,7 @@ from scene import (
     evaluated,
     grid,
     linked,
+    placed,
     points_of,
     refined,
     triangles_of,
@@ -195,3 +196,20 @@ def test_objects_that_share_a_mesh_share_the_result():
     bpy.ops.object.pns_refine(keep_original=False)
     assert obj.data == twin.data
     assert len(obj.data.polygons) == 96
+
+
+def test_detail_makes_faces_where_the_surface_bends():
+    obj = grid(9)
+    with pytest.raises(RuntimeError, match="triangulate it"):
+        refined(obj, detail="FACES", max_faces=1000)
+    points, faces = points_of(obj.data), triangles_of(obj.data)
+    obj = placed("Triangles", points.tolist(), [list(map(int, face)) for face in faces])
+    expected = pns_common.refine(
+        pns_common.Mesh(points, faces), pns_common.loop(), max_faces=1000, creases=None
+    )
+    made = refined(obj, detail="FACES", max_faces=1000, scheme="LOOP").data
+    np.testing.assert_allclose(points_of(made), expected.mesh.vertices, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(triangles_of(made), expected.mesh.faces)
+    assert 900 < len(made.polygons) <= 1000
+    near = refined(obj, detail="TOLERANCE", tolerance=0.05).data
+    assert "adaptive" in near.pns_result.report

@@ -38,6 +38,18 @@ def test_faces_are_the_librarys(goal):
     np.testing.assert_allclose(attributes["POSITION"][faces], made.vertices[made.faces], atol=1e-6)
 
 
+def test_the_most_faces_are_those_of_the_file():
+    coarse, fine = (bumpy_sphere(subdivisions=level, bump=0.3) for level in (0, 1))
+    meshes = [[{"POSITION": p.astype(np.float32), "indices": f}] for p, f in (coarse, fine)]
+    one, other = (len(faces) for _, faces in (coarse, fine))
+    made = refined(*meshes, max_faces=3000)
+    counts = [mesh["adaptive"]["faces"] for mesh in made.report["meshes"]]
+    assert 0.9 * 3000 * one / (one + other) < counts[0] <= 3000 * one / (one + other)
+    assert sum(counts) <= 3000
+    with pytest.raises(InvalidParameter, match=f"at least {one + other}"):
+        refined(*meshes, max_faces=one + other - 1)
+
+
 def test_texture_coordinates_are_linear_on_both_sides_of_a_seam():
     shape = shaped()
     faces, made = shape["indices"], library(**GOAL)
