@@ -152,7 +152,7 @@ def _hulls(
     flat = corners.reshape(-1).astype(np.int64)
     begin, end = (np.searchsorted(ends[:, 0], flat, side=side) for side in ("left", "right"))
     counts = end - begin
-    at = np.arange(counts.sum()) + np.repeat(begin - np.cumsum(counts) + counts, counts)
+    at = np.repeat(begin - np.cumsum(counts) + counts, counts) + np.arange(int(counts.sum()))
     face = np.repeat(np.arange(len(flat)) // 3, counts)
     to = part.points[ends[at, 1]] - triangles[face, 0]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
