@@ -137,8 +137,12 @@ def general_quad(seed: int = 0) -> Recipe:
     """Return the recipe for meshes of polygons: `general` over Catmull–Clark."""
     base = general(seed)
     assert base.directed is not None
+    assert isinstance(base.training, OnPairs)
     over = replace(base.directed, base="catmull-clark")
-    return replace(base, name="general-quad", directed=over)
+    # Quads along a wall gain a little by being sharp where they meet its rim, and look it.
+    weights = replace(base.training.weights, sharp=0.5)
+    plan = msgspec.structs.replace(base.training, weights=weights)
+    return replace(base, name="general-quad", directed=over, training=plan)
 
 
 RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
