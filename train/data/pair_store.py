@@ -16,7 +16,7 @@ from pns_common.files import replace_file
 from train.data.pairs.drawn import drawn_pair
 from train.data.pairs.pair_stream import pair_stream
 from train.data.pairs.polygons import in_polygons, polygon_stream
-from train.data.pairs.references import Pair
+from train.data.pairs.references import Pair, ball_pair
 from train.data.shape_library import TRAINING, ListedShape, listed_shapes
 from train.data.shape_pairs import shape_pairs
 
@@ -25,6 +25,8 @@ MOST_POINTS = 20_000
 
 # One in so many procedural pairs is drawn with few sides: of triangles, and of polygons.
 DRAWN, DRAWN_POLYGONS = 5, 2
+# How often a drawn one of triangles is a ball. Quads of balls would round cubes.
+BALLS = 0.2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,13 +116,16 @@ def _keep_procedural(folder: Path, count: int, seed: int, polygons: bool) -> lis
 
 
 def _with_drawn(seed: int, polygons: bool) -> Iterator[Pair]:
-    """Yield the stream's pairs, and bodies of revolution in place of some."""
+    """Yield the stream's pairs, and bodies of revolution and balls in place of some."""
     rng = np.random.default_rng(seed)
     stream = polygon_stream(seed) if polygons else pair_stream(seed)
     often = DRAWN_POLYGONS if polygons else DRAWN
     for number in count_from_0():
         if number % often:
             yield next(stream)
+            continue
+        if not polygons and rng.random() < BALLS:
+            yield ball_pair(rng)
             continue
         pair = drawn_pair(rng)
         yield replace(pair, coarse=in_polygons(pair.coarse, rng)) if polygons else pair

@@ -1,7 +1,7 @@
-"""Bodies drawn with few sides: cones, spindles, drums and what lies between; and balls.
+"""Bodies of revolution drawn with few sides: cones, spindles, drums, and what lies between.
 
-From `ROUND` sides on bodies of revolution stand for the round body through their corners, whose
-tips and rims are sharp; with fewer sides they are meant as they are.
+From `ROUND` sides on they stand for the round body through their corners, whose tips and rims are
+sharp; with fewer sides they are meant as they are.
 """
 
 import numpy as np
@@ -9,22 +9,17 @@ from jaxtyping import Float
 
 from train.data.pairs.faceted import sampled
 from train.data.pairs.lathe import FINE, FINE_SHARP, ROUND, Plan, centred, raised, random_lid
-from train.data.pairs.references import Pair, ball_pair, sharp_edges
+from train.data.pairs.references import Pair, sharp_edges
 from train.surfaces.solids import random_rotation
 
 FEWEST_SIDES, MOST_SIDES = 3, 33
-
-# How often it is a ball.
-BALLS = 0.2
 
 # Radius of the smaller end of a drum, and heights, in radii.
 NARROW, HEIGHTS = 0.3, (0.3, 3.0)
 
 
 def drawn_pair(rng: np.random.Generator) -> Pair:
-    """Return a cone, a spindle or a drum, turned at random in space; or a ball."""
-    if rng.random() < BALLS:
-        return ball_pair(rng)
+    """Return a cone, a spindle or a drum, turned at random in space."""
     sides = int(np.exp(rng.uniform(*np.log((FEWEST_SIDES, MOST_SIDES)))))
     outline = OUTLINES[int(rng.integers(len(OUTLINES)))](rng)
     plan = circle(sides)
