@@ -12,7 +12,7 @@ from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, every_edge_class, prism, tilted_plane
 from tests.support.networks import default_model
 
-SCHEME = pns(default_model(2, 1.0))
+SCHEME = pns(default_model(8, 1.0))
 RULE = SCHEME.rule
 
 
