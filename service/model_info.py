@@ -27,6 +27,7 @@ ROWS = {
     "fold_angle": "fold angle θ",
     "sharpness_levels": "sharpness levels",
     "width": "width W",
+    "hidden": "hidden units H",
     "rounds": "rounds",
 }
 # A metric on the card: what was measured, and its improvement over the reference in per cent.

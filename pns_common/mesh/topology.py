@@ -183,8 +183,8 @@ class Topology:
     def sharpest(self) -> SharpVertices | None:
         """The vertices on sharp and soft edges, and corners; None where there is none of all.
 
-        At the ends of boundaries soft edges that are learned do not count, so that meshes that
-        share a boundary still meet there.
+        Where sharpness is learned, corners too, soft edges do not count at the ends of boundaries,
+        so that meshes that share a boundary still meet there.
         """
         if not (len(self.sharp_edges) or len(self.soft) or self.has_corners):
             return None
@@ -195,7 +195,7 @@ class Topology:
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
         ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
-        if len(self.soft) and len(ends):
+        if len(self.soft) and len(self.soft_corners) and len(ends):
             at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
             marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
             loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)
@@ -308,7 +308,7 @@ class Topology:
         """Return a copy with learned corner weights, where they are less."""
         if len(self.soft_corners):
             weights = np.maximum(weights, self.soft_corners)
-        return replace(self, soft_corners=weights if weights.any() else NO_WEIGHTS)
+        return replace(self, soft_corners=weights)
 
     def soft_corners_of_split(self, count: int, *, inherit: bool) -> Float[np.ndarray, " SV"]:
         """Return ``soft_corners`` a level later, where there are ``count`` vertices.
@@ -316,7 +316,7 @@ class Topology:
         Those of weight 1, as where a border turns, stay for good.
         """
         kept = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
-        if not kept.any():
+        if not (kept.any() or (inherit and len(kept))):
             return NO_WEIGHTS
         return np.concatenate([kept, np.zeros(count - self.vertex_count)])
 

@@ -116,6 +116,7 @@ class ModelEntry(BaseModel):
         description="at how many levels `crease=auto` keeps sharp edges; null in format 1"
     )
     width: int | None = Field(description="numbers in a state; null in format 1")
+    hidden: int | None = Field(description="numbers of a round's hidden layer; null in format 1")
     rounds: int | None = Field(description="rounds of messages; null in format 1")
     training: dict[str, Any] = Field(description="recipe, seed, and what else fixes the training")
     metrics: dict[str, Any] = Field(description="measured on held-out data")

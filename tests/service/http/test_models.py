@@ -95,7 +95,7 @@ def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
     both = report(client, "model=vertices")
     assert both["model"] == "vertices"
     assert both["budget"] == DEFAULT_CARD.budget
-    assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.1
+    assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
     assert report(client, "")["model"] == DEFAULT_MODEL
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")
 
