@@ -194,8 +194,8 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
-        if len(self.soft) and len(self.soft_corners) and len(ends):
+        if len(self.soft) and len(self.soft_corners):
+            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
             at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
             marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
             loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)

@@ -26,7 +26,7 @@ DEFAULT_CARD = ModelCard(
     hidden=12,
     rounds=2,
 )
-HIDDEN = 12
+HIDDEN = DEFAULT_CARD.hidden
 
 
 def model_bytes(
