@@ -275,11 +275,7 @@ class _Carry:
         return self.carrier.at_vertices(Column(layer.values, rule))
 
     def _edge(self, layer: Layer) -> np.ndarray:
-        if len(layer.values) == 0:
-            return np.zeros((len(self.edge_parent), layer.values.shape[1]), layer.values.dtype)
-        known = self.edge_parent >= 0
-        values = layer.values[np.where(known, self.edge_parent, 0)]
-        return np.where(known[:, None], values, np.zeros_like(values))
+        return edge_values(layer, self.edge_parent)
 
     def _face(self, layer: Layer) -> np.ndarray:
         return layer.values[self.control.polygons][self.carrier.face_parents]
@@ -292,6 +288,13 @@ class _Carry:
         same = np.round(values, 3) if layer.unit else None
         keep = KEPT[self.choice.uv_smooth] if layer.kind == "FLOAT2" else "boundaries"
         return self.carrier.at_corners(Column(values, rules.smooth, keep, layer.unit, same))
+
+
+def edge_values(layer: Layer, parents: Int[np.ndarray, " E"]) -> np.ndarray:
+    """Return a layer's values at the edges' parents; 0 where an edge has none, −1."""
+    if len(layer.values) == 0:
+        return np.zeros((len(parents), layer.values.shape[1]), layer.values.dtype)
+    return np.where((parents >= 0)[:, None], layer.values[parents], np.zeros_like(layer.values[:1]))
 
 
 class _Bar:

@@ -17,7 +17,7 @@ from pns_common.mesh.normals import angle_weighted_normals, smooth_fans
 from pns_common.mesh.topology import MOSTLY_SHARP, Topology
 from pns_common.parallel import Blocks, available_threads
 
-from .compute import Choice, compute, scheme_of, split_vertices
+from .compute import Choice, compute, edge_values, scheme_of, split_vertices
 from .hidden import hide_within
 from .shading import shaded
 from .shown_creases import shown_creases
@@ -192,10 +192,7 @@ class _Carry:
         return values[parents.columns[order[parents.starts[1:] - 1]]]
 
     def _edge(self, layer: Layer) -> np.ndarray:
-        if len(layer.values) == 0:
-            return np.zeros((len(self.edge_parents), layer.values.shape[1]), layer.values.dtype)
-        known = (self.edge_parents >= 0)[:, None]
-        return np.where(known, layer.values[self.edge_parents], np.zeros_like(layer.values[:1]))
+        return edge_values(layer, self.edge_parents)
 
     def _face(self, layer: Layer) -> np.ndarray:
         return layer.values[self.control.polygons][self.made.face_parents]
