@@ -167,6 +167,11 @@ class Topology:
         return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
 
     @property
+    def ending(self) -> Bool[np.ndarray, " E"]:
+        """Flags of the edges that wear off at this level."""
+        return self.wears & (self.wear <= 1) if len(self.wear) else self.wears
+
+    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
@@ -184,26 +189,45 @@ class Topology:
         """The vertices on sharp and soft edges, and corners; None where there is none of all.
 
         Where sharpness is learned, corners too, soft edges do not count at the ends of boundaries,
-        so that meshes that share a boundary still meet there.
+        so that meshes that share a boundary still meet there. Edges that wear off at this level
+        count in part, as in OpenSubdiv: by the mean of what is left of them at each vertex.
         """
         if not (len(self.sharp_edges) or len(self.soft) or self.has_corners):
             return None
-        edges = self.sharp_edges
-        if len(self.soft):
-            edges = np.flatnonzero(self.sharpness > 0).astype(np.uint32)
-        weights = np.zeros((self.vertex_count, 3))
-        neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
-        loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        if len(self.soft) and len(self.soft_corners):
-            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
-            at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
-            marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
-            loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)
-            weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
+        weights, neighbours = self._three_sharpest(self.sharpness)
+        if self.ending.any():
+            ends, left = self.edges[self.ending].reshape(-1), np.repeat(self.wear[self.ending], 2)
+            count = np.bincount(ends, minlength=self.vertex_count)
+            total = np.bincount(ends, left, self.vertex_count)
+            share = (total / np.maximum(count, 1))[:, None]
+            weights, neighbours = self._three_sharpest(np.where(self.ending, 0.0, self.sharpness))
+            sharper, beside = self._three_sharpest(np.where(self.ending, 1.0, self.sharpness))
+            # Where a curve is left without them, it goes on.
+            curve = weights[:, 1:2] > weights[:, 2:]
+            neighbours = np.where(curve, neighbours, beside)
+            weights = weights + share * (sharper - weights)
         if self.has_corners:
             corner = self.corner_weights[:, None]
             weights = corner + (1 - corner) * weights
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
+
+    def _three_sharpest(
+        self, sharpness: Float[np.ndarray, " E"]
+    ) -> tuple[Float[np.ndarray, "V 3"], UInt32[np.ndarray, "V 2"]]:
+        """Return the sharpness of the three sharpest edges at each vertex, and ends of two."""
+        edges = self.sharp_edges
+        if len(self.soft):
+            edges = np.flatnonzero(sharpness > 0).astype(np.uint32)
+        weights = np.zeros((self.vertex_count, 3))
+        neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
+        loop.sharpest_edges(self.edges, edges, sharpness, weights, neighbours)
+        if len(self.soft) and len(self.soft_corners):
+            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
+            at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
+            marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
+            loop.sharpest_edges(self.edges, marked, sharpness, at_ends, beside)
+            weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
+        return weights, neighbours
 
     @cached_property
     def valence(self) -> Integer[np.ndarray, " V"]:
