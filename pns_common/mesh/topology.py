@@ -75,6 +75,8 @@ class Topology:
         plain: no face names a vertex twice, and no two triangles have the same vertices.
         wear: (E,) at how many more levels each edge that wears off is sharp, infinity for good, its
             last part in part; (0,) where none does.
+        found: (E,) learned sharpness of edges that wear off: they are at least so sharp; (0,) where
+            it is 0 at all.
         soft_corners: (V,) learned corner weight κ in [0, 1] of each vertex, which lasts as long as
             the sharpness of edges; (0,) where it is 0 at all.
     """
@@ -92,6 +94,7 @@ class Topology:
     plain: bool
     soft_corners: Float[np.ndarray, " SV"] = field(default_factory=lambda: NO_WEIGHTS)
     wear: Float[np.ndarray, " W"] = field(default_factory=lambda: NO_WEIGHTS)
+    found: Float[np.ndarray, " SW"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -200,7 +203,8 @@ class Topology:
             count = np.bincount(ends, minlength=self.vertex_count)
             total = np.bincount(ends, left, self.vertex_count)
             share = (total / np.maximum(count, 1))[:, None]
-            weights, neighbours = self._three_sharpest(np.where(self.ending, 0.0, self.sharpness))
+            rest = np.where(self.ending, self.found if len(self.found) else 0.0, self.sharpness)
+            weights, neighbours = self._three_sharpest(rest)
             sharper, beside = self._three_sharpest(np.where(self.ending, 1.0, self.sharpness))
             # Where a curve is left without them, it goes on.
             curve = weights[:, 1:2] > weights[:, 2:]
@@ -285,18 +289,30 @@ class Topology:
         soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
         if len(self.soft):
             soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
-        return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        if len(self.wear):
+            found = np.where(self.wears & np.isfinite(self.wear), sharpness, 0.0)
+            made = replace(made, found=found if found.any() else NO_WEIGHTS)
+        return made
 
     def with_wear(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
         """Return a copy whose interior edges are sharp for so many levels, infinity for good."""
-        made = self.with_sharpness(np.minimum(sharpness, 1.0))
+        made = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
+        made = made.with_sharpness(np.minimum(sharpness, 1.0))
         wear = np.where(self.edge_class == kernels.INTERIOR, sharpness, 0.0)
         return replace(made, wear=wear if wear.any() else NO_WEIGHTS)
 
-    def worn(self, parent: Topology, halves: Integer[np.ndarray, "E 2"] | None = None) -> Topology:
+    def worn(
+        self,
+        parent: Topology,
+        halves: Integer[np.ndarray, "E 2"] | None = None,
+        *,
+        inherit: bool = True,
+    ) -> Topology:
         """Return the copy of a split in which edges that wear off are a level less sharp.
 
         ``halves`` are the edges that each edge of the parent was split into, if they are known.
+        ``inherit``: whether what is learned of them lasts.
         """
         if len(parent.wear) == 0:
             return self
@@ -310,7 +326,12 @@ class Topology:
         if len(soft):
             soft[own] = 0.0
         left[own] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
-        return replace(self, edge_class=classes, soft=soft).with_wear(left)
+        made = replace(self, edge_class=classes, soft=soft).with_wear(left)
+        if inherit and len(parent.found):
+            found = np.zeros(len(self.edges))
+            found[own] = parent.found[rows][:, None]
+            made = made.with_sharpness(found)
+        return made
 
     def with_border(self, rule: str) -> Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
@@ -355,7 +376,7 @@ class Topology:
     def without_creases(self) -> Topology:
         """Return a copy without creases, soft edges and corners."""
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
-        kinds = "soft", "vertex_sharpness", "soft_corners", "wear"
+        kinds = "soft", "vertex_sharpness", "soft_corners", "wear", "found"
         none = dict.fromkeys(kinds, NO_WEIGHTS)
         return replace(self, edge_class=classes.astype(np.int8), **none)
 
@@ -465,7 +486,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return (inheriting(made, parent) if inherit else made).worn(parent)
+        return (inheriting(made, parent) if inherit else made).worn(parent, inherit=inherit)
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
     face_count, edge_count = parent.face_count, len(parent.edges)
@@ -501,7 +522,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         plain=True,
         soft_corners=soft_corners,
     )
-    return made.worn(parent, halves)
+    return made.worn(parent, halves, inherit=inherit)
 
 
 def inheriting(made: Topology, parent: Topology) -> Topology:
