@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
+
+from pns_common.carry import rules
 
 from .attributes import KINDS, STRUCTURE
 from .reading import Reading
-from .refining.snapshot import Domain, Refined, Rule
+from .refining.snapshot import Refined
 from .words import listed
 
 # Modifiers that remember the mesh they were bound to, by the name of the flag that says so.
@@ -35,7 +36,7 @@ def losses(obj: bpy.types.Object, reading: Reading, refined: Refined) -> list[st
 
 def _of_faces(reading: Reading, refined: Refined) -> list[str]:
     said = []
-    if reading.snapshot.has_polygons and (np.diff(refined.faces.starts) == 3).all():
+    if reading.snapshot.has_polygons and refined.topology.triangles:
         said.append("Faces of more than three corners became triangles")
     loose = int((~reading.snapshot.edge_used).sum())
     if loose:
@@ -46,11 +47,11 @@ def _of_faces(reading: Reading, refined: Refined) -> list[str]:
 def _of_attributes(mesh: bpy.types.Mesh, reading: Reading) -> list[str]:
     said = []
     layers = [layer for layer in reading.snapshot.layers if not layer.name.startswith(".")]
-    voted = [layer.name for layer in layers if layer.rule is Rule.VOTE]
+    voted = [layer.name for layer in layers if layer.rule is rules.vote]
     if voted:
         said.append(f"New points and corners have the value of most parents: {listed(voted)}")
     own = {"sharp_edge", "bevel_weight_edge", "uv_seam", "freestyle_edge"}
-    edges = [x.name for x in layers if x.domain is Domain.EDGE and x.name not in own]
+    edges = [x.name for x in layers if x.domain == "EDGE" and x.name not in own]
     if edges:
         said.append(f"Edges new inside faces have the value zero: {listed(edges)}")
     unknown = [

@@ -12,10 +12,9 @@ import bpy
 
 from .losses import irregularities, losses
 from .reading import Reading, read_mesh
-from .refining.compute import Choice
+from .refining.compute import Choice, compute
 from .refining.job import Job, StoppedError
 from .refining.snapshot import Refined
-from .refining.to_goal import refine_snapshot
 from .result import remember
 from .writing import write_mesh
 
@@ -126,7 +125,7 @@ def refine_mesh(
     mesh: bpy.types.Mesh = obj.data
     if reading is None:
         reading = yield from read_mesh(mesh)
-    job = Job(partial(refine_snapshot, reading.snapshot, choice)).start()
+    job = Job(partial(compute, reading.snapshot, choice)).start()
     try:
         while job.running:
             share.value = (number + job.share) / count

@@ -10,8 +10,8 @@ import numpy as np
 from .animation import copy_animation
 from .attributes import is_carried, write_layer
 from .reading import FREESTYLE, Reading
-from .refining.snapshot import Domain, Refined
-from .refining.steps import crease_of
+from .refining.creases import crease_of
+from .refining.snapshot import Refined
 
 # What a mesh that is shown live says of its refined copy, and of itself.
 CACHE = ("cache", "spare", "first", "second")
@@ -86,23 +86,23 @@ def take_name(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
 
 
 def _write_faces(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:
-    faces = refined.faces
+    faces = refined.topology
     mesh.vertices.add(len(refined.points))
     mesh.edges.add(len(refined.edges))
     yield
-    mesh.loops.add(len(faces.vertices))
-    mesh.polygons.add(len(faces.parents))
+    mesh.loops.add(len(faces.corners))
+    mesh.polygons.add(faces.face_count)
     yield
     mesh.attributes["position"].data.foreach_set("vector", _flat(refined.points, np.float32))
     yield
     # Attributes are copied as a block; the same numbers as properties are set one by one.
     mesh.attributes[".edge_verts"].data.foreach_set("value", _flat(refined.edges, np.int32))
     yield
-    mesh.polygons.foreach_set("loop_start", _flat(faces.starts[:-1], np.int32))
+    mesh.polygons.foreach_set("loop_start", _flat(faces.offsets[:-1], np.int32))
     yield
-    mesh.attributes[".corner_vert"].data.foreach_set("value", _flat(faces.vertices, np.int32))
+    mesh.attributes[".corner_vert"].data.foreach_set("value", _flat(faces.corners, np.int32))
     yield
-    mesh.attributes[".corner_edge"].data.foreach_set("value", _flat(faces.edges, np.int32))
+    mesh.attributes[".corner_edge"].data.foreach_set("value", _flat(faces.corner_edges, np.int32))
     yield
 
 
@@ -110,7 +110,7 @@ def _write_layers(mesh: bpy.types.Mesh, refined: Refined) -> Generator[None, Non
     lost = []
     for layer in refined.layers:
         if layer.kind == FREESTYLE:
-            rows = mesh.edges if layer.domain is Domain.EDGE else mesh.polygons
+            rows = mesh.edges if layer.domain == "EDGE" else mesh.polygons
             rows.foreach_set("use_freestyle_mark", _flat(layer.values, np.bool_))
         elif is_carried(layer.name) and layer.kind != "NORMAL":
             try:
