@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bl_ext.user_default.pns_refine.operator as operator
 import bpy
 import pytest
-from bl_ext.user_default.pns_refine.run import StoppedError
+from bl_ext.user_default.pns_refine.refining.job import StoppedError
 from scene import chosen, grid, points_of, refined
 
 
