@@ -39,7 +39,8 @@ def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
 
 def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     """Refine by Loop's rules."""
-    return _smooth("Loop", refine(mesh, loop(), levels), {})
+    made = refine(mesh, loop(), levels).mesh
+    return Shape("Loop", made.vertices, made.faces, True, {})
 
 
 def subsurf_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
@@ -95,13 +96,9 @@ VARIANTS: dict[str, Callable[[Mesh, int, str | None], Shape]] = {
 }
 
 
-def _smooth(title: str, made: Refinement, fields: dict[str, np.ndarray]) -> Shape:
-    return Shape(title, made.mesh.vertices, made.mesh.faces, True, fields)
-
-
 def _beside_loop(
     title: str, made: Refinement, mesh: Mesh, levels: int, fields: dict[str, np.ndarray]
 ) -> Shape:
-    plain = refine(mesh, loop(), levels)
-    distance = np.linalg.norm(made.mesh.vertices - plain.mesh.vertices, axis=1)
-    return _smooth(title, made, {"distance": distance, **fields})
+    plain, points = refine(mesh, loop(), levels), made.mesh.vertices
+    distance = np.linalg.norm(points - plain.mesh.vertices, axis=1)
+    return Shape(title, points, made.mesh.faces, True, {"distance": distance, **fields})

@@ -31,9 +31,7 @@ class _OfLive:
         """Return whether the operator can be used on the active object."""
         problem, obj = cls.problem(context), context.object
         if problem is None and not (obj.is_editable and obj.data.is_editable):
-            problem = (
-                "Linked from another file, which alone can keep live mode: make it local first"
-            )
+            problem = "Linked from another file: make it local first, as live mode is kept in it"
         if problem is not None:
             cls.poll_message_set(problem)
         return problem is None

@@ -119,9 +119,7 @@ def _weights(mesh: bpy.types.Mesh) -> Generator[None, None, tuple[np.ndarray, in
 
 def _creases(mesh: bpy.types.Mesh, name: str, count: int) -> np.ndarray:
     attribute = mesh.attributes.get(name)
-    if attribute is None:
-        return np.zeros(count)
-    return _floats(attribute.data, "value", 1)[:, 0]
+    return np.zeros(count) if attribute is None else _floats(attribute.data, "value", 1)[:, 0]
 
 
 def _freestyle(mesh: bpy.types.Mesh) -> list[Layer]:

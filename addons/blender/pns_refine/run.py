@@ -125,7 +125,7 @@ def refine_mesh(
     mesh: bpy.types.Mesh = obj.data
     if reading is None:
         reading = yield from read_mesh(mesh)
-    job = Job(partial(compute, reading.snapshot, choice)).start()
+    job = Job(partial(compute, reading.snapshot, choice))
     try:
         while job.running:
             share.value = (number + job.share) / count

@@ -298,7 +298,7 @@ def test_progress_rises_inside_a_level_and_can_stop_the_work():
 
 
 def test_a_job_answers_stops_at_its_next_report_and_hands_on_errors():
-    job = Job(lambda report: 42).start()
+    job = Job(lambda report: 42)
     assert (job.answer(), job.share, job.running) == (42, 1, False)
     started, go_on, reached = threading.Event(), threading.Event(), []
 
@@ -309,7 +309,7 @@ def test_a_job_answers_stops_at_its_next_report_and_hands_on_errors():
         report(0.5)
         reached.append("the end")
 
-    job = Job(work).start()
+    job = Job(work)
     started.wait()
     assert (job.running, job.share) == (True, 0.25)
     job.cancel()
@@ -318,4 +318,4 @@ def test_a_job_answers_stops_at_its_next_report_and_hands_on_errors():
         job.answer()
     assert not reached
     with pytest.raises(ZeroDivisionError):
-        Job(lambda report: 1 / 0).start().answer()
+        Job(lambda report: 1 / 0).answer()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -74,35 +74,18 @@ def compute(snapshot: Snapshot, choice: Choice, progress: Progress = lambda shar
     shows = choice.crease_lines and scheme.creases.finds
     if shows:
         creases = with_shown(marked, snapshot, control, scheme.creases, for_good=bool(choice.goals))
-    if choice.goals:
-        made = refine(
-            control.mesh,
-            scheme,
-            **choice.goals,
-            creases=creases,
-            progress=_part(progress, 0.0, POSITIONS),
-        )
-        surface: Surface = SeveralLevels(cast(AdaptiveRefinement, made))
-        plain = made.carry(control.mesh.vertices)
+    asked = choice.goals or {"levels": choice.levels, "limit": choice.limit}
+    told = _part(progress, 0.0, POSITIONS)
+    made = refine(control.mesh, scheme, **asked, creases=creases, progress=told)
+    surface: Surface
+    if isinstance(made, AdaptiveRefinement):
+        surface, plain = SeveralLevels(made), made.carry(control.mesh.vertices)
     else:
-        asked = {"levels": choice.levels, "limit": choice.limit}
-        made = refine(
-            control.mesh,
-            scheme,
-            **asked,
-            creases=creases,
-            progress=_part(progress, 0.0, POSITIONS),
-        )
         surface, plain = WholeLevels(made), made.mesh.vertices
         if choice.model is not None:
             # The base scheme alone knows of no lines.
-            plain = refine(
-                control.mesh,
-                named_scheme(scheme.base.name),
-                **asked,
-                creases=marked,
-                progress=_part(progress, POSITIONS, BASE),
-            ).mesh.vertices
+            base, told = named_scheme(scheme.base.name), _part(progress, POSITIONS, BASE)
+            plain = refine(control.mesh, base, **asked, creases=marked, progress=told).mesh.vertices
     offsets, groups = snapshot.offsets, snapshot.groups
     moved = np.concatenate([groups, *offsets], axis=1)
     moved = surface.at_vertices(Column(moved, rules.smooth))
@@ -111,9 +94,9 @@ def compute(snapshot: Snapshot, choice: Choice, progress: Progress = lambda shar
     parents = np.where(surface.edge_parents >= 0, control.own_edge[surface.edge_parents], -1)
     parents = np.r_[parents, loose]
     layers = []
-    for number, layer in enumerate(snapshot.layers, 1):
+    for layer in snapshot.layers:
         layers.append(replace(layer, values=_carried(layer, surface, control, parents, choice)))
-        progress(VERTICES + (1 - VERTICES) * number / len(snapshot.layers))
+        progress(VERTICES + (1 - VERTICES) * len(layers) / len(snapshot.layers))
     normals = None if made.normals is None else surface.normals
     layers = shaded(layers, surface.sharp, len(loose), normals, smooth=shows)
     topology, old, count = surface.topology, len(snapshot.points), len(made.mesh.vertices)

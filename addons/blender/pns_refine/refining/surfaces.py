@@ -1,8 +1,12 @@
-"""A refined surface with all that it carries: of whole levels, or of faces of several."""
+"""A refined surface with all that it carries: of whole levels, or of faces of several.
+
+Both kinds have the same members: ``topology`` of the refined faces; ``edge_parents``, the control
+edge that each edge is a piece of (−1 inside faces); ``face_parents``; ``sharp``, flags of the edges
+that are sharp on the surface; ``ratio`` and ``gate`` of the last learned level; ``at_vertices`` and
+``at_corners``, which refine a column; and ``normals`` of corners, one-sided along sharp edges.
+"""
 
 from __future__ import annotations
-
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -22,37 +26,6 @@ from pns_common.mesh.normals import angle_weighted_normals, measure_faces, smoot
 from pns_common.mesh.topology import MOSTLY_SHARP, Topology
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes.limit import limit_normals
-
-
-class Surface(Protocol):
-    """A refined mesh and what carries values to it.
-
-    Attributes:
-        topology: the refined faces, with their edges.
-        edge_parents: the control edge that each edge is a piece of; −1 for those inside faces.
-        face_parents: the control face that each face is a part of.
-        sharp: flags of the edges that are sharp on the surface.
-        ratio, gate: diagnostics of the last learned level.
-    """
-
-    topology: Topology
-    edge_parents: Int[np.ndarray, " E"]
-    face_parents: Int[np.ndarray, " F"]
-    sharp: Bool[np.ndarray, " E"]
-    ratio: Float[np.ndarray, " W"]
-    gate: Float[np.ndarray, " W"]
-
-    def at_vertices(self, column: Column) -> Shaped[np.ndarray, "W K"]:
-        """Refine values at vertices."""
-        ...
-
-    def at_corners(self, column: Column) -> Shaped[np.ndarray, "C K"]:
-        """Refine values at corners of the control mesh to those of the refined faces."""
-        ...
-
-    def normals(self, sharp: Bool[np.ndarray, " E"]) -> Float[np.ndarray, "C 3"]:
-        """Return the limit surface's normal at each corner, one-sided along sharp edges."""
-        ...
 
 
 class WholeLevels:
@@ -140,3 +113,6 @@ class SeveralLevels:
         own = np.asarray(self._made.normals)[faces]
         several = np.isin(faces, pairs) | ~own.any(axis=2)
         return np.where(several[..., None], sides, own).reshape(-1, 3)
+
+
+Surface = WholeLevels | SeveralLevels
