@@ -71,7 +71,7 @@ class Answers:
 def directed_features(
     level: Level, begin: int, end: int, feature_type: type[np.floating[Any]] = np.float32
 ) -> Float[np.ndarray, "D 28"]:
-    """Return the features of edges begin … end − 1: first all a → b, then all b → a.
+    """Return the features of edges begin … end − 1: of each a → b, then b → a.
 
     ``level`` must have no marks: ``level.unmarked``.
     """
@@ -144,13 +144,9 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     states = np.empty((2 * count, width), dtype=kind)
     told = np.empty((mesh.vertex_count, 2 * networks.hidden), dtype=kind)
 
-    def both(begin: int, end: int) -> tuple[slice, slice]:
-        return slice(begin, end), slice(count + begin, count + end)
-
     def encode(begin: int, end: int) -> None:
-        rows = checked_answers(networks.encoder, directed_features(level, begin, end, kind), width)
-        there, back = both(begin, end)
-        states[there], states[back] = rows[: end - begin], rows[end - begin :]
+        rows = directed_features(level, begin, end, kind)
+        states[2 * begin : 2 * end] = checked_answers(networks.encoder, rows, width)
 
     def tell(network: Network, begin: int, end: int) -> None:
         pooled = np.empty((end - begin, 2 * width), dtype=kind)
@@ -160,10 +156,8 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     def hear(update: Network, begin: int, end: int) -> None:
         messages = np.empty((2 * (end - begin), 2 * width + networks.hidden), dtype=kind)
         kernels.gather(states, told, edges, begin, end, messages)
-        more, (there, back) = checked_answers(update, messages, width), both(begin, end)
         # Both ways of an edge stand in one block: nobody else reads these rows any more.
-        states[there] += more[: end - begin]
-        states[back] += more[end - begin :]
+        states[2 * begin : 2 * end] += checked_answers(update, messages, width)
 
     asked, of_leaving = np.empty((count, 3)), np.empty((2 * count, 3))
     logits, corner_logits = np.empty(count), np.empty(2 * count)
@@ -172,13 +166,12 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     of_edges = edges, mesh.half_edges, mesh.edge_class
 
     def answer(begin: int, end: int) -> None:
-        there, back = both(begin, end)
-        rows = np.concatenate([states[there], states[back]])
-        heads = checked_answers(networks.heads, rows, networks.answers).astype(np.float64)
+        rows = slice(2 * begin, 2 * end)
+        heads = checked_answers(networks.heads, states[rows], networks.answers).astype(np.float64)
         kernels.read_heads(*geometry, *of_edges, heads, begin, end, asked, of_leaving, logits)
         for own, column in (corner_logits, kernels.CORNER), (heights, kernels.FACE):
             if len(own):
-                own[there], own[back] = np.split(heads[:, column], 2)
+                own[rows] = heads[:, column]
 
     blocks.run(count, encode)
     for at_vertices, at_edges in networks.rounds:
