@@ -124,7 +124,7 @@ class Refinement:
             "model": self.scheme.model,
             "model_hash": self.scheme.model_hash,
             "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.steps[0].level.multi_fan_vertices.sum()),
+            "multi_fan_vertices": int(self.steps[0].level.topology.multi_fan_vertices.sum()),
             **limit_distances(levels, shift),
             "levels": levels,
         }
@@ -409,9 +409,10 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
         with np.errstate(over="ignore", invalid="ignore"):
             added = scheme.rule(level)
         points = added.points
+        check_coordinates(points, level.blocks)
     else:
+        # Means of points: not farther out than these.
         points = level.base.place(level.points, level.topology, level.blocks)
-    check_coordinates(points, level.blocks)
     kept = Level(level.points, level.topology, level.base, level.reference_length, level.blocks)
     return Step(kept, points, added)  # without measurements, which are most of the memory
 

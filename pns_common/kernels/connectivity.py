@@ -267,7 +267,7 @@ def count_corners(corners: u4_1d, reach: i8_2d, begin: int, end: int, corner: i4
 
 
 @kernel
-def mark_multi_fan(
+def count_fans(
     offsets: i4_1d,
     face_of_corner: u4_1d,
     corner_edges: u4_1d,
@@ -277,14 +277,14 @@ def mark_multi_fan(
     count: i4_1d,
     begin: int,
     end: int,
-    multi_fan: b1_1d,
+    fans: i1_1d,
 ):
-    """Mark the vertices begin … end − 1 whose corners form more than one fan.
+    """Write how many fans the corners of vertices begin … end − 1 form: 0, 1, or 2 for more.
 
     Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
     """
     for v in range(max(begin, 0), end):
-        multi_fan[v] = False
+        fans[v] = 0
         if count[v] == 0:
             continue
         start = corner[v]
@@ -305,7 +305,7 @@ def mark_multi_fan(
                 if h < 0:
                     break
                 seen += 1
-        multi_fan[v] = seen != count[v]
+        fans[v] = 1 if seen == count[v] else 2
 
 
 # --- the split of triangles ----------------------------------------------------------------------
