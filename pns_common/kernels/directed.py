@@ -23,7 +23,7 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, previous_corner
+from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, opposite
 from pns_common.kernels.frames import wing
 from pns_common.kernels.measures import LENGTH
 from pns_common.kernels.vectors import across, cross, difference, divisor, dot, norm, over, row
@@ -109,7 +109,7 @@ def _opposite(points, h, corners, offsets, face_of_corner):
     if len(face_of_corner):
         c = wing(points, h, corners, offsets, face_of_corner)
         return c[0], c[1], c[2]
-    return row(points, corners[previous_corner(h)])
+    return row(points, opposite(corners, h))
 
 
 @kernel

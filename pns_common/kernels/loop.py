@@ -21,25 +21,17 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, opposite, skipped_block
 
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
 MIDPOINT = 1 / 2
 CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
 
 
-@inlined
-def opposite(faces, half_edge):
-    """Return the vertex of a half-edge's triangle that is not on it."""
-    f = half_edge // 3
-    i = half_edge - 3 * f
-    return faces[f, i - 1 if i > 0 else 2]
-
-
 @kernel
 def place_edges(
     points: f8_2d,
-    faces: u4_2d,
+    corners: u4_1d,
     edges: u4_2d,
     half_edges: i4_2d,
     edge_class: i1_1d,
@@ -56,7 +48,7 @@ def place_edges(
     for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]
         if edge_class[e] == INTERIOR:
-            c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+            c, d = opposite(corners, half_edges[e, 0]), opposite(corners, half_edges[e, 1])
             for k in range(3):
                 ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
                 placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
