@@ -18,6 +18,7 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import loop as kernels
 from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
+from pns_common.parameters import is_masked
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75
@@ -469,8 +470,7 @@ def _first_alike(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Intege
 
 def _array(values: object, element: str) -> np.ndarray:
     """Return what numpy makes of the input, refused where rows differ in length or have holes."""
-    if np.ma.is_masked(values):
-        # numpy would read what lies under the mask.
+    if is_masked(values):
         raise MeshError("masked numbers, expected three in each row", element=element)
     try:
         return np.asarray(values)
