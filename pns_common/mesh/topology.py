@@ -190,8 +190,9 @@ class Topology:
             return None
         weights, neighbours = self._sharpest_of(self.soft)
         if len(self.soft) and len(self.soft_corners):
-            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
-            if len(ends):
+            on_boundary = self.edge_class == kernels.BOUNDARY
+            if on_boundary.any():
+                ends = np.unique(self.edges[on_boundary])
                 marked = np.where(self.wear > 0, self.soft, 0.0) if len(self.wear) else NO_WEIGHTS
                 at_ends, beside = self._sharpest_of(marked)
                 weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
@@ -587,6 +588,6 @@ def _keys(pairs: Integer[np.ndarray, "N 2"], vertex_count: int) -> Integer[np.nd
 
 
 def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Integer[np.ndarray, "B 2"]:
-    starts = np.arange(0, len(vertices), each)
-    ends = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
-    return np.stack(ends, axis=1).astype(np.int64)
+    made = np.empty((-(-len(vertices) // each), 2), dtype=np.int64)
+    kernels.find_reach(vertices, each, made)
+    return made

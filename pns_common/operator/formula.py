@@ -255,8 +255,9 @@ def directed_level(level: Level, rule: DirectedRule) -> Additions:
 
         level.blocks.run(len(rows), correct)
     curves = find_curves(level.points, mesh.without_soft(), len(x))
-    along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-    made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
+    if len(curves.new_rows):
+        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+        made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
     made.scale(scale)
     x += delta
