@@ -17,7 +17,7 @@ from ..settings import Settings
 from ..workers.models import ModelEntry
 from . import openapi
 from .access.clients import Client, client_of
-from .answer import FileAnswer, StreamAnswer, answer_type, is_known, unless_gone
+from .answer import answer_type, file_answer, is_known, stream_answer, unless_gone
 from .jobs import Service
 from .parameters import Parameters
 
@@ -111,7 +111,7 @@ async def _subdivide(
         job = await held.enter_async_context(taking)
         if is_stream:
             file_type = media.MEDIA_TYPES[parameters.format]
-            return StreamAnswer(service, job, held.pop_all(), file_type)
+            return stream_answer(service, job, held.pop_all(), file_type, request)
         await unless_gone(request.receive, service.serve(job))
         file = job.report if is_report else job.answer
-        return FileAnswer(service, job, held.pop_all(), kind, file)
+        return file_answer(service, job, held.pop_all(), kind, file)

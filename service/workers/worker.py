@@ -19,6 +19,7 @@ from typing import TypeVar
 from .. import log_lines
 from ..errors import ServiceError
 from ..log_lines import REQUEST_ID
+from .progress import PROGRESS, Progress
 
 T = TypeVar("T")
 
@@ -34,8 +35,9 @@ class JobFaultError(Exception):
     """A fault of ours inside a job; the text is the worker's traceback, for the log only."""
 
 
-def prepare() -> None:
+def prepare(progress: Progress) -> None:
     """Set up a fresh worker process."""
+    PROGRESS.set(progress)
     # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     log_lines.configure()
