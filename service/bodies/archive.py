@@ -10,8 +10,7 @@ import io
 import stat
 import zipfile
 import zlib
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 
 from ..errors import ServiceError, UnreadableError, check_limit
 from .media import is_apple_double
@@ -60,13 +59,10 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         raise ArchiveError(f"the archive holds {len(documents)} glTF files")
     main = documents[0]
     folder = main.rpartition("/")[0]
-    unpacker = _Unpacker(opened, entries, len(data), max_bytes)
-    siblings = SiblingFiles(partial(_find, unpacker), frozenset(entries) - {main}, folder)
+    allowed = min(max_bytes, max(RATIO_FLOOR, MAX_RATIO * len(data)))
+    unpacker = _Unpacker(opened, entries, allowed)
+    siblings = SiblingFiles(unpacker.find, frozenset(entries) - {main}, folder)
     return unpacker.read(main), siblings
-
-
-def _find(unpacker: _Unpacker, name: str) -> File | None:
-    return unpacker.read(name) if name in unpacker.entries else None
 
 
 def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -100,20 +96,21 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
 class _Unpacker:
     opened: zipfile.ZipFile
     entries: dict[str, zipfile.ZipInfo]
-    packed: int
-    max_bytes: int
-    unpacked: int = field(default=0)
+    allowed: int
+    unpacked: int = 0
+
+    def find(self, name: str) -> File | None:
+        return self.read(name) if name in self.entries else None
 
     def read(self, name: str) -> File:
         """Unpack one file piece by piece, until it ends or a limit does."""
         pieces: list[bytes] = []
-        allowed = min(self.max_bytes, max(RATIO_FLOOR, MAX_RATIO * self.packed))
         try:
             with self.opened.open(self.entries[name]) as file:
                 while piece := file.read(_PIECE):
                     self.unpacked += len(piece)
                     text = f"the archive unpacks to {self.unpacked} bytes or more"
-                    check_limit("archive-bytes", self.unpacked, allowed, text)
+                    check_limit("archive-bytes", self.unpacked, self.allowed, text)
                     pieces.append(piece)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, ValueError) as error:
             raise UnreadableError(f"the archive cannot be read: {error}") from error

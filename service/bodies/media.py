@@ -39,7 +39,6 @@ _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 
 GLB_MAGIC = b"glTF"
 ZIP_MAGIC = b"PK\x03\x04"
-BLANK = b" \t\r\n"
 IDENTITY, GZIP = "identity", "gzip"
 # zlib's number for a gzip header and its checksum.
 _GZIP_BITS = 31
@@ -92,7 +91,7 @@ def sniff(data: bytes) -> str:
 def begins_as_json(data: bytes) -> bool:
     """Return whether a file begins as a JSON object does."""
     # A slice: a file of nothing but blanks is not to be copied to find that out.
-    return data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{")
+    return data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def kind_of(name: str) -> Kind | None:
@@ -100,12 +99,6 @@ def kind_of(name: str) -> Kind | None:
     ending = name.rpartition("/")[2].rpartition(".")[2].lower()
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
     return (kinds | ALIASES).get(ending)
-
-
-def mesh_kind_of(name: str) -> Kind | None:
-    """Tell by a file name's extension what the first bytes would not tell: no glTF."""
-    kind = kind_of(name)
-    return None if kind in GLTF_KINDS else kind
 
 
 def encoding_of(header: str) -> str:

@@ -231,34 +231,33 @@ class Workers:
             process = _Process(holder, progress)
             self._processes.append(process)
             try:
-                why = await self._life(process)
+                await self._warmed_up(process)
+                while not process.broken.done():
+                    await asyncio.wait({process.broken}, timeout=WATCH_SECONDS)
+                    # With no request to find one that died while it was free, none would be.
+                    if process.holder is None and not process.pool.active:
+                        process.broken.set_result("idle")
             finally:
                 await _whole(process.end())
                 self._processes.remove(process)
             holder = process.holder or ""
-            self._replaced(why)
-            if why == "start":
+            self._replaced(process.broken.result())
+            if process.broken.result() == "start":
                 await asyncio.sleep(RESTART_SECONDS)
 
-    async def _life(self, process: _Process) -> str:
-        """Let a process warm up and do jobs, until it breaks; return why it did."""
+    async def _warmed_up(self, process: _Process) -> None:
         try:
             await _result(process.pool, _scheduled(process.pool, self._warm_up), WARM_UP_SECONDS)
             process.warm = True
         except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
             # What a disk had no room for, say, it may have soon.
             log.warning("a worker did not start: %s", _reason(error))
-            return "start"
+            process.broken.set_result("start")
+            return
         except Exception as error:
             # A model does not load, say: the process serves what needs none.
             log.warning("a worker did not warm up: %s", error)
         self._let_go(process)
-        while not process.broken.done():
-            # With no request to find one that died while it was free, none would be.
-            if process.holder is None and not process.pool.active:
-                return "idle"
-            await asyncio.wait({process.broken}, timeout=WATCH_SECONDS)
-        return process.broken.result()
 
 
 async def _whole(work: Coroutine[Any, Any, object]) -> None:

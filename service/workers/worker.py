@@ -8,7 +8,6 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -99,9 +98,8 @@ def rare_searches() -> Iterator[None]:
 
 def give_back() -> None:
     """Return freed memory, which glibc keeps for the next job, to the system."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if trim is not None:
-        trim(0)
+    # Only glibc has it.
+    getattr(ctypes.CDLL(None), "malloc_trim", bool)(0)
 
 
 @contextmanager

@@ -7,7 +7,6 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import httpx2
 import pytest
@@ -84,21 +83,6 @@ def test_healthz_answers_while_a_large_body_is_taken_in(client: httpx2.Client) -
             probes += 1
     # Were it parsed in one go, one at most would be answered meanwhile.
     assert probes > 5
-
-
-def test_a_client_that_leaves_frees_its_worker(
-    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
-) -> None:
-    for number in range(4):
-        # Twice as many as there are workers, and more than the queue holds.
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        body = f"steps {folder}".encode()
-        with socket.create_connection(address) as leaving:
-            leaving.sendall(request_head(len(body)) + body)
-            until((folder / "took-1").exists)
-    # A job may take an hour here: only leaving has freed them.
-    assert subdivide(client, b"here").content == b"here"
 
 
 def test_a_client_that_leaves_during_its_upload_is_forgotten(

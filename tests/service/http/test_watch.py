@@ -53,18 +53,16 @@ def test_a_sane_request_id_is_kept(client, sent, caplog):
     assert lines(caplog)[0]["request_id"] == sent
 
 
-@pytest.mark.parametrize("sent", ["", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "../a", "é"])
-def test_another_is_replaced(client, sent):
-    answer = client.get("/nothing", headers=[(b"x-request-id", sent.encode("latin-1"))])
+@pytest.mark.parametrize(
+    "sent", [*([each] for each in ("", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "é")), ["a", "b"]]
+)
+def test_others_are_replaced(client, sent):
+    headers = [(b"x-request-id", each.encode("latin-1")) for each in sent]
+    answer = client.get("/nothing", headers=headers)
     given_back = answer.headers["x-request-id"]
-    assert given_back != sent
+    assert given_back not in sent
     assert len(given_back) == 16
     assert answer.json()["request_id"] == given_back
-
-
-def test_two_ids_are_none(client):
-    headers = [("X-Request-ID", "a"), ("X-Request-ID", "b")]
-    assert client.get("/healthz", headers=headers).headers["x-request-id"] not in ("a", "b")
 
 
 def test_a_fault_has_its_request_id_everywhere(client, caplog):
