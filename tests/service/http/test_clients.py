@@ -35,18 +35,12 @@ def request(address: tuple[str, int] | None, **state: object) -> Request:
         ("testclient", "address:testclient"),
     ],
 )
-def test_an_address_is_a_client_and_has_the_services_budget(address: str, client: str) -> None:
+def test_who_sends_no_key_is_the_client_of_its_address(address: str, client: str) -> None:
     settings = Settings(faces_per_minute=77)
     assert client_of(request((address, 1)), settings) == Client(client, 77)
-
-
-def test_a_request_from_nowhere_is_a_client_too() -> None:
-    assert client_of(request(None), Settings()).id == "address:"
-
-
-def test_a_client_that_was_found_before_stands() -> None:
+    assert client_of(request(None), settings) == Client("address:", 77)
     named = Client("key:mine", 5)
-    assert client_of(request(("192.0.2.7", 1), client=named), Settings()) is named
+    assert client_of(request((address, 1), client=named), settings) is named
 
 
 def test_a_client_has_so_many_places_and_all_together_so_many() -> None:

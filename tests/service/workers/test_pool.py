@@ -194,27 +194,16 @@ async def test_stop_ends_running_jobs(tmp_path: Path) -> None:
     await asyncio.gather(task, return_exceptions=True)
 
 
-async def test_ready_once_a_worker_has_warmed_up() -> None:
-    async with workers() as pool:
-        assert not pool.ready
-        await do(pool, jobs.nothing)
-        assert pool.ready
-    async with workers(warm_up=jobs.refuse) as pool:
-        await do(pool, jobs.nothing)
-        assert not pool.ready
-
-
-async def test_not_ready_once_the_last_warm_worker_is_gone(tmp_path: Path) -> None:
+async def test_ready_while_a_worker_that_has_warmed_up_lives(tmp_path: Path) -> None:
     model = tmp_path / "model"
     model.touch()
-
     async with workers(warm_up=partial(jobs.needs, str(model))) as pool:
+        assert not pool.ready
         first = await do(pool, jobs.pid)
         assert pool.ready
         model.unlink()
         os.kill(first, signal.SIGKILL)
-        while pool.ready:
-            await asyncio.sleep(0.05)
+        await until(lambda: not pool.ready)
         # The next one lives, but has no model.
         assert await do(pool, jobs.pid) != first
         assert not pool.ready
