@@ -47,6 +47,18 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         ArchiveError: not one document; a name that leads out of the archive, a link, encryption.
         LimitError: too many entries, or too much in them.
     """
+    unpacker = unpacker_of(data, max_bytes)
+    documents = [name for name in unpacker.entries if name.lower().endswith(_DOCUMENTS)]
+    if len(documents) != 1:
+        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
+    main = documents[0]
+    folder = main.rpartition("/")[0]
+    siblings = SiblingFiles(partial(_find, unpacker), frozenset(unpacker.entries) - {main}, folder)
+    return unpacker.read(main), siblings
+
+
+def unpacker_of(data: bytes, max_bytes: int = 0) -> Unpacker:
+    """Open any .zip, of which `max_bytes` at most are unpacked; errors are `open_archive`'s."""
     # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
     count = data.count(_INDEX_ENTRY)
     check_limit("archive-entries", count, MAX_ENTRIES, f"the archive has {count} entries")
@@ -54,18 +66,10 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         opened = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
         raise UnreadableError(f"the archive cannot be read: {error}") from error
-    entries = _entries(opened)
-    documents = [name for name in entries if name.lower().endswith(_DOCUMENTS)]
-    if len(documents) != 1:
-        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
-    main = documents[0]
-    folder = main.rpartition("/")[0]
-    unpacker = _Unpacker(opened, entries, len(data), max_bytes)
-    siblings = SiblingFiles(partial(_find, unpacker), frozenset(entries) - {main}, folder)
-    return unpacker.read(main), siblings
+    return Unpacker(opened, _entries(opened), len(data), max_bytes)
 
 
-def _find(unpacker: _Unpacker, name: str) -> File | None:
+def _find(unpacker: Unpacker, name: str) -> File | None:
     return unpacker.read(name) if name in unpacker.entries else None
 
 
@@ -97,7 +101,9 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
 
 
 @dataclass
-class _Unpacker:
+class Unpacker:
+    """The files of an archive by name, and how many bytes of them may be unpacked."""
+
     opened: zipfile.ZipFile
     entries: dict[str, zipfile.ZipInfo]
     packed: int
