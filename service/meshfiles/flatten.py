@@ -20,7 +20,7 @@ from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Document
 from ..gltf.read.upload import Upload
 from ..gltf.refine.attributes import RefinedPrimitive
-from ..gltf.refine.columns import read_skin_and_morph
+from ..gltf.refine.skin import read_skin_and_morph
 from ..meshes.weld import weld, weld_by_label
 from ..options import Limits
 from ..report import Change

@@ -260,12 +260,12 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
     faces = mesh.corners[fans(mesh.offsets)[0]]
-    after = _without_area(mesh.vertices.astype(np.float32), faces)
-    # Most meshes have no such face, and then none that rounding makes.
-    before = _without_area(mesh.vertices, faces) if after.any() else after
+    rounded, flat = mesh.vertices.astype(np.float32), 0
+    if not np.array_equal(rounded, mesh.vertices):
+        flat = int((_without_area(rounded, faces) & ~_without_area(mesh.vertices, faces)).sum())
     rounding = "once positions are rounded to float32"
     told = {
-        f"faces without an area {rounding}": int((after & ~before).sum()),
+        f"faces without an area {rounding}": flat,
         f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
             faces_too_far(mesh.vertices, faces)
         ),
