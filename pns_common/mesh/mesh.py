@@ -321,6 +321,8 @@ def fans(
 ) -> tuple[Integer[np.ndarray, "T 3"], Integer[np.ndarray, " T"]]:
     """Return the corners of the triangles that faces are cut into, and the face of each."""
     counts = np.diff(offsets) - 2
+    if (counts == 1).all():
+        return np.arange(3 * len(counts)).reshape(-1, 3), np.arange(len(counts))
     face = np.repeat(np.arange(len(counts)), counts)
     step = np.arange(len(face)) - (np.cumsum(counts) - counts)[face] + 1
     first = offsets[face]

@@ -46,6 +46,18 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         ArchiveError: not one document; a name that leads out of the archive, a link, encryption.
         LimitError: too many entries, or too much in them.
     """
+    unpacker = unpacker_of(data, max_bytes)
+    documents = [name for name in unpacker.entries if name.lower().endswith(_DOCUMENTS)]
+    if len(documents) != 1:
+        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
+    main = documents[0]
+    folder = main.rpartition("/")[0]
+    siblings = SiblingFiles(unpacker.find, frozenset(unpacker.entries) - {main}, folder)
+    return unpacker.read(main), siblings
+
+
+def unpacker_of(data: bytes, max_bytes: int = 0) -> Unpacker:
+    """Open any .zip, of which `max_bytes` at most are unpacked; errors are `open_archive`'s."""
     # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
     count = data.count(_INDEX_ENTRY)
     check_limit("archive-entries", count, MAX_ENTRIES, f"the archive has {count} entries")
@@ -53,16 +65,8 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         opened = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
         raise UnreadableError(f"the archive cannot be read: {error}") from error
-    entries = _entries(opened)
-    documents = [name for name in entries if name.lower().endswith(_DOCUMENTS)]
-    if len(documents) != 1:
-        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
-    main = documents[0]
-    folder = main.rpartition("/")[0]
     allowed = min(max_bytes, max(RATIO_FLOOR, MAX_RATIO * len(data)))
-    unpacker = _Unpacker(opened, entries, allowed)
-    siblings = SiblingFiles(unpacker.find, frozenset(entries) - {main}, folder)
-    return unpacker.read(main), siblings
+    return Unpacker(opened, _entries(opened), allowed)
 
 
 def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -93,13 +97,16 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
 
 
 @dataclass
-class _Unpacker:
+class Unpacker:
+    """The files of an archive by name, and how many bytes of them may be unpacked."""
+
     opened: zipfile.ZipFile
     entries: dict[str, zipfile.ZipInfo]
     allowed: int
     unpacked: int = 0
 
     def find(self, name: str) -> File | None:
+        """Unpack the file of that name; None where there is none."""
         return self.read(name) if name in self.entries else None
 
     def read(self, name: str) -> File:

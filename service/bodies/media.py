@@ -16,12 +16,12 @@ MIXED = "multipart/mixed"
 ZIP = "application/zip"
 
 # As their names end.
-Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
+Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off", "3mf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 GLTF_KINDS = ("glb", "gltf")
 # Other endings of the same kinds: a VRM is a GLB.
 ALIASES: dict[str, Kind] = {"vrm": "glb"}
-# The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered.
+# The pipeline's name of each file type. OBJ's, STL's and 3MF's beside glTF's are registered.
 FORMATS: dict[str, Kind] = {
     GLB: "glb",
     GLTF: "gltf",
@@ -29,6 +29,7 @@ FORMATS: dict[str, Kind] = {
     "model/ply": "ply",
     "model/stl": "stl",
     "model/off": "off",
+    "model/3mf": "3mf",
 }
 MEDIA_TYPES: dict[Kind, str] = {kind: media for media, kind in FORMATS.items()}
 # Any glTF, or an archive of one, told by its first bytes: generated clients send no other type.

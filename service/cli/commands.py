@@ -30,7 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Proximity-Preserving Neural Subdivision of glTF, OBJ, PLY, STL and OFF files.",
+    help="Proximity-Preserving Neural Subdivision of glTF, OBJ, PLY, STL, OFF and 3MF files.",
 )
 
 

@@ -106,7 +106,7 @@ SUBDIVIDE: dict[str, Any] = {
         "Answers with the refined GLB, whose `asset.extras.pns` holds the report; with "
         "`Accept: application/json`, as `POST /report` does; with `Accept: multipart/mixed`, with "
         "a stream of how far it is, and then both. "
-        "Materials, textures, nodes and names stay. OBJ, PLY, STL and OFF come as their media "
+        "Materials, textures, nodes and names stay. OBJ, PLY, STL, OFF and 3MF come as their media "
         "type, or in a form under a file name with their extension; what they hold that a GLB of "
         "plain triangles does not is named in the report's `changes`."
     ),
