@@ -98,48 +98,45 @@ def stream_answer(
     stream that ends with the closing boundary is whole.
     """
     boundary = secrets.token_hex(16)
-    pieces = _parts(service, job, file_type, request, boundary)
+    # It follows each part at once: so its reader knows that it is whole.
+    end = f"\r\n--{boundary}".encode()
+
+    async def parts() -> AsyncGenerator[bytes]:
+        work = asyncio.create_task(service.serve(job))
+        try:
+            yield end[2:]
+            said, silent = b"", 0.0
+            while not work.done():
+                now = _progress(service, job)
+                if now != said or silent >= SILENT_SECONDS:
+                    said, silent = now, 0.0
+                    yield _head("progress", media.JSON) + now + end
+                await asyncio.wait({work}, timeout=LOOK_SECONDS)
+                silent += LOOK_SECONDS
+            try:
+                work.result()
+            except (ServiceError, JobFaultError) as error:
+                document = problems.of_failure(error)
+                # For the journal.
+                request.state.problem = document.code
+                yield _head("problem", problems.MEDIA_TYPE) + bytes(document.body) + end
+            else:
+                timing = f"Server-Timing: {server_timing(job.seconds)}"
+                files = ("file", file_type, job.answer), ("report", media.JSON, job.report)
+                with service.places.taking(job.client.id, job.end):
+                    for name, kind, file in files:
+                        yield _head(name, kind, f"Content-Length: {file.size}", timing)
+                        for piece in file.pieces():
+                            yield piece
+                        yield end
+            yield b"--\r\n"
+        finally:
+            work.cancel()
+            await asyncio.gather(work, return_exceptions=True)
+
     # A proxy that collects the stream (nginx) would keep it until its end.
     headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    return Answer(service, job, held, pieces, f"{media.MIXED}; boundary={boundary}", headers)
-
-
-async def _parts(
-    service: Service, job: Job, file_type: str, request: Request, boundary: str
-) -> AsyncGenerator[bytes]:
-    work = asyncio.create_task(service.serve(job))
-    # A boundary follows each part at once: so its reader knows that it is whole.
-    end = f"\r\n--{boundary}".encode()
-    try:
-        yield end[2:]
-        said, silent = b"", 0.0
-        while not work.done():
-            now = _progress(service, job)
-            if now != said or silent >= SILENT_SECONDS:
-                said, silent = now, 0.0
-                yield _head("progress", media.JSON) + now + end
-            await asyncio.wait({work}, timeout=LOOK_SECONDS)
-            silent += LOOK_SECONDS
-        try:
-            work.result()
-        except (ServiceError, JobFaultError) as error:
-            document = problems.of_failure(error)
-            # For the journal.
-            request.state.problem = document.code
-            yield _head("problem", problems.MEDIA_TYPE) + bytes(document.body) + end
-        else:
-            timing = f"Server-Timing: {server_timing(job.seconds)}"
-            files = ("file", file_type, job.answer), ("report", media.JSON, job.report)
-            with service.places.taking(job.client.id, job.end):
-                for name, kind, file in files:
-                    yield _head(name, kind, f"Content-Length: {file.size}", timing)
-                    for piece in file.pieces():
-                        yield piece
-                    yield end
-        yield b"--\r\n"
-    finally:
-        work.cancel()
-        await asyncio.gather(work, return_exceptions=True)
+    return Answer(service, job, held, parts(), f"{media.MIXED}; boundary={boundary}", headers)
 
 
 def _head(name: str, kind: str, *more: str) -> bytes:

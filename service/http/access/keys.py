@@ -16,7 +16,6 @@ from starlette.types import Scope
 from ...errors import UnauthorizedError
 from .clients import Client
 
-PREFIX = "pns"
 NAME = r"[a-z0-9][a-z0-9-]{0,62}"
 
 
@@ -45,7 +44,7 @@ def new_key(name: str) -> str:
     """Make a fresh key of that name. Raises KeysError where it cannot be one."""
     if not re.fullmatch(NAME, name):
         raise KeysError(f"{name!r}: a name is 1 to 63 of a-z, 0-9 and -, not - first")
-    return f"{PREFIX}_{name}_{secrets.token_urlsafe(32)}"
+    return f"pns_{name}_{secrets.token_urlsafe(32)}"
 
 
 def hash_of(key: str) -> str:
