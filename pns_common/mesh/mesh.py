@@ -50,6 +50,10 @@ class Mesh:
         MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
             number, a NaN, infinite or huge coordinate, an extent too small to compute with, or an
             index out of range; the error names the element.
+
+    Example:
+        >>> Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).face_count
+        1
     """
 
     __slots__ = ("_faces", "_offsets", "corners", "vertices")
@@ -271,6 +275,11 @@ def clean(mesh: Mesh) -> Cleaned:
     Raises:
         ParameterError: it is no Mesh.
         MeshError: every face is degenerate.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [2, 1, 0], [0, 1, 1]])
+        >>> clean(mesh).mesh.face_count
+        1
     """
     check_is_mesh(mesh)
     degrees, leader = np.diff(mesh.offsets), np.arange(mesh.face_count)
