@@ -183,7 +183,7 @@ class AdaptiveRefinement(Refinement):
             "model": self.scheme.model,
             "model_hash": self.scheme.model_hash,
             "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.control.multi_fan_vertices.sum()),
+            "multi_fan_vertices": int(self.control.topology.multi_fan_vertices.sum()),
             **limit_distances(learned, self.limit_shift),
             "levels": learned,
             "adaptive": {

@@ -22,7 +22,7 @@ from pns_common.mesh.mesh import Mesh, check_is_mesh
 from pns_common.model.file import load_model
 from pns_common.operator.curves import corner_shares, find_curves
 from pns_common.operator.directed import answers_of
-from pns_common.operator.formula import DirectedRule, directed_gates
+from pns_common.operator.formula import DirectedRule, spread_gates
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme, loop, pns
 from pns_common.parallel import Blocks
@@ -62,8 +62,7 @@ def shares_of_corners(level: Level, rule: DirectedRule) -> Float[np.ndarray, " V
     """
     answers, seen = answers_of(level, rule.networks), level.unmarked
     mesh = seen.topology
-    smooth = np.zeros(len(mesh.edges))
-    gate, _, _ = directed_gates(mesh, seen.edges.jumps, smooth, rule)
+    _, gate, *_ = spread_gates(mesh, np.tanh(rule.vertex_gate_sharpness * seen.edges.jumps))
     shares = np.minimum(clearly(gate * answers.corners), SHARPEST)
     counts = mesh.sharp_count
     if len(counts):

@@ -456,8 +456,11 @@ def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any
 @contextmanager
 def _progress(console: Console) -> Iterator[Course]:
     """Show a bar on a terminal while the work goes on, and leave nothing behind."""
+    if not console.is_terminal:
+        yield Course()
+        return
     from rich.progress import Progress
 
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(console=console, transient=True) as bar:
         task = bar.add_task("refining", total=1.0)
         yield Course(moves=lambda share: bar.update(task, completed=share))
