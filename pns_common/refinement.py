@@ -219,6 +219,11 @@ def refine(
         ParameterError: an argument out of range, or a crease that is no edge.
         ModelError: the network's answer is not finite, or has another shape.
         MeshError: the refined coordinates are too large, or not numbers.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> refine(mesh, "loop", levels=2).mesh.face_count
+        64
     """
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
@@ -392,7 +397,14 @@ def refine_many(
     limit: bool = True,
     threads: int | None = None,
 ) -> list[Refinement]:
-    """Refine meshes one after the other, each with its own creases; None: no edge."""
+    """Refine meshes one after the other, each with its own creases; None: no edge.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> [made] = refine_many([(mesh, None)], named_scheme("loop"), levels=1)
+        >>> made.mesh.face_count
+        16
+    """
     return [
         refine(
             mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads

@@ -49,6 +49,10 @@ class Creases:
         ParameterError: pairs or vertices that are no whole numbers, sharpness that is not one
             number from 0 to 1 a pair, or from 0 on a vertex, an angle outside 0 … 180, levels
             below 1, or another border.
+
+    Example:
+        >>> Creases(np.array([[0, 1]]), sharpness=np.array([0.5])).levels is None
+        True
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None

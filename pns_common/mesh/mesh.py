@@ -52,6 +52,10 @@ class Mesh:
         MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
             number, a NaN, infinite or huge coordinate, an extent too small to compute with, or an
             index out of range; the error names the element.
+
+    Example:
+        >>> Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).face_count
+        1
     """
 
     __slots__ = ("_faces", "_offsets", "corners", "vertices")
@@ -269,6 +273,11 @@ def clean(mesh: Mesh) -> Cleaned:
     Raises:
         ParameterError: it is no Mesh.
         MeshError: every face is degenerate.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [2, 1, 0], [0, 1, 1]])
+        >>> clean(mesh).mesh.face_count
+        1
     """
     check_is_mesh(mesh)
     degrees, leader = np.diff(mesh.offsets), np.arange(mesh.face_count)
@@ -319,6 +328,8 @@ def fans(
 ) -> tuple[Integer[np.ndarray, "T 3"], Integer[np.ndarray, " T"]]:
     """Return the corners of the triangles that faces are cut into, and the face of each."""
     counts = np.diff(offsets) - 2
+    if (counts == 1).all():
+        return np.arange(3 * len(counts)).reshape(-1, 3), np.arange(len(counts))
     face = np.repeat(np.arange(len(counts)), counts)
     step = np.arange(len(face)) - (np.cumsum(counts) - counts)[face] + 1
     first = offsets[face]

@@ -116,6 +116,11 @@ def sharp_edges(
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
         ModelError: a network's answer is not finite, or has another shape.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> len(sharp_edges(mesh, angle=60))
+        6
     """
     check_is_mesh(mesh)
     if scheme is None:
