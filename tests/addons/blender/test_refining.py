@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from addons.blender.pns_refine.refining.compute import POSITIONS, Choice, compute
-from addons.blender.pns_refine.refining.creases import crease_of, crease_sharpness_of
+from addons.blender.pns_refine.refining.creases import crease_of, crease_sharpness_of, shaded_edges
 from addons.blender.pns_refine.refining.job import Job, StoppedError
 from pns_common import Creases, MeshError, catmull_clark, load_model, loop, pns, refine
 from pns_common.carry import rules
@@ -127,6 +127,12 @@ def test_hard_edges_of_smooth_shading_are_kept_where_lines_are_asked_for():
     for layers, lines, count in cases:
         made = compute(replace(shape, layers=layers), Choice(GENERAL, 1, crease_lines=lines))
         assert (made.crease_sharpness == GENERAL.card.sharpness_levels - 1).sum() == count
+        # The base scheme alone knows of none.
+        plain = compute(shape, Choice(GENERAL, 1, budget=0.0)).points
+        np.testing.assert_allclose(made.distance, np.linalg.norm(made.points - plain, axis=1))
+    # A polygon's own diagonals have one normal on both sides.
+    flat = replace(shape, layers=(switch("sharp_face", "FACE", one),))
+    assert shaded_edges(flat, shape.control(whole=False))[1].sum() == 4
 
 
 def test_a_goal_is_the_librarys_and_what_it_cannot_do_is_said():
@@ -282,6 +288,8 @@ def test_marks_and_flat_faces_of_the_mesh_stay_where_nothing_is_found():
     assert named(flat, "sharp_face").sum() == 8
     assert named(flat, "normals") is None
     assert named(compute(shape, Choice(None, 1, limit=False)), "normals") is None
+    whole = replace(shape, layers=(switch("sharp_face", "FACE", np.ones(16)),))
+    assert named(compute(whole, Choice(None, 1)), "sharp_face") is None
 
 
 # --- the work -------------------------------------------------------------------------------------
