@@ -295,7 +295,9 @@ def test_undo_brings_back_what_was_removed_by_hand_and_saved(tmp_path):
 
 
 def test_undo_of_a_duplicates_edit_shows_the_common_result_again():
-    before = shown(started(grid(4)))
+    obj = grid(4)
+    obj.data.materials.append(bpy.data.materials.new("Own"))
+    before = shown(started(obj))
     bpy.ops.object.duplicate()
     twin = bpy.context.object
     pushed(settle, lambda: edit(twin, settled=False))
@@ -304,6 +306,7 @@ def test_undo_of_a_duplicates_edit_shows_the_common_result_again():
     for handler in bpy.app.handlers.undo_pre:
         handler(bpy.context.scene)
     assert twin.modifiers[0].node_group is twin.data.pns_live.cache is None
+    assert list(obj.data.pns_live.cache.data.materials) == [None]
     bpy.ops.ed.undo()
     settle()
     np.testing.assert_allclose(shown(bpy.data.objects["Grid.001"]), before, atol=1e-6)
