@@ -165,16 +165,6 @@ class Topology:
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
     @property
-    def wears(self) -> Bool[np.ndarray, " E"]:
-        """Flags of the edges that are sharp for so many levels."""
-        return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
-
-    @property
-    def ending(self) -> Bool[np.ndarray, " E"]:
-        """Flags of the edges that wear off at this level."""
-        return self.wears & (self.wear <= 1) if len(self.wear) else self.wears
-
-    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
@@ -198,7 +188,8 @@ class Topology:
         if not (self.edge_class.any() or len(self.soft) or self.has_corners):
             return None
         weights, neighbours = self._three_sharpest(self.edge_class, self.soft)
-        if len(self.wear) and (ending := self.ending).any():
+        ending = (self.wear > 0) & (self.wear <= 1)
+        if ending.any():
             ends, left = self.edges[ending].reshape(-1), np.repeat(self.wear[ending], 2)
             count = np.bincount(ends, minlength=self.vertex_count)
             total = np.bincount(ends, left, self.vertex_count)
@@ -302,7 +293,7 @@ class Topology:
             soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
         made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
         if len(self.wear):
-            found = np.where(self.wears & np.isfinite(self.wear), sharpness, 0.0)
+            found = np.where((self.wear > 0) & np.isfinite(self.wear), sharpness, 0.0)
             made = replace(made, found=found if found.any() else NO_WEIGHTS)
         return made
 
