@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import torch
 from jaxtyping import Bool, Float, Int
@@ -178,7 +177,7 @@ def signed_18(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float
     )
 
 
-EDGE_FEATURES = MappingProxyType({"paper-5": paper_5, "signed-18": signed_18})
+EDGE_FEATURES = {"paper-5": paper_5, "signed-18": signed_18}
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Faces of meshes that pass through other faces, found in a tree of boxes."""
+"""Faces of meshes that pass through other faces."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh
-from train.data.primitives import icosphere
-from train.metrics.face_boxes import face_boxes
-from train.metrics.self_intersection import self_intersecting
+from train.data.icosphere import icosphere
+from train.metrics.self_intersection import crossing_faces
 
 
 def by_every_pair(mesh):
@@ -36,7 +35,7 @@ def test_agrees_with_every_pair(seed, noise):
     rng = np.random.default_rng(seed)
     sphere = icosphere(1)
     mesh = Mesh(sphere.vertices + noise * rng.normal(size=sphere.vertices.shape), sphere.faces)
-    np.testing.assert_array_equal(self_intersecting(face_boxes(mesh)), by_every_pair(mesh))
+    np.testing.assert_array_equal(crossing_faces(mesh), by_every_pair(mesh))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -55,4 +54,4 @@ def test_a_wall_of_rulings_does_not_cross_itself_by_rounding(seed):
     )
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     noise = 1e-11 * np.random.default_rng(seed).normal(size=points.shape)
-    assert not self_intersecting(face_boxes(Mesh(points @ turn + noise, faces))).any()
+    assert not crossing_faces(Mesh(points @ turn + noise, faces)).any()

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import torch
-
 from train.data.patches import rounded_boxes, tori
 from train.surfaces.cad import Fillet, RoundedBox, Torus
+
 from train.surfaces.implicit import Ridge, Saddle, SphereRidge, signed_distance, unit_normal
 from train.surfaces.smooth import Bump, Crossing, CurvedRidge, LumpySphere
 

@@ -9,7 +9,7 @@ from tests.support.meshes import bent, grid
 from train.experiments.harness.variants import (
     PNS,
     fit_variant,
-    variant_method,
+    variant_scheme,
 )
 from train.fitting.trainer import fit
 from train.models.from_recipe import initial_network
@@ -21,7 +21,7 @@ from train.refining import refine
 def test_the_full_variant_is_the_operator_and_trains_as_it():
     recipe, mesh = paper(), Mesh(*grid(6, bent))
     network = initial_network(recipe)
-    ours = refine(mesh, variant_method(PNS, network, recipe), 2)
+    ours = refine(mesh, variant_scheme(PNS, network, recipe), 2)
     theirs = refine(mesh, pns(recipe_model(recipe, network), recipe.budget), 2)
     np.testing.assert_allclose(ours.mesh.vertices, theirs.mesh.vertices, atol=1e-7)
     np.testing.assert_allclose(ours.ratio, theirs.ratio, atol=1e-6)

@@ -6,7 +6,6 @@ its kind.
 
 import warnings
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any
 
 import fast_simplification
@@ -96,16 +95,14 @@ def isotropic(mesh: Mesh, faces: int) -> Mesh:
     return _by_meshlab(mesh, _remeshed, length * np.sqrt(len(first.faces) / faces))
 
 
-SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
-    {
-        "fast-quadric": fast_quadric,
-        "MeshLab": meshlab_quadric,
-        "MeshLab, own vertices": meshlab_vertices,
-        "VTK": vtk_quadric,
-        "pyacvd": centroidal,
-        "isotropic": isotropic,
-    }
-)
+SIMPLIFIERS: Mapping[str, Simplifier] = {
+    "fast-quadric": fast_quadric,
+    "MeshLab": meshlab_quadric,
+    "MeshLab, own vertices": meshlab_vertices,
+    "VTK": vtk_quadric,
+    "pyacvd": centroidal,
+    "isotropic": isotropic,
+}
 
 
 def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
