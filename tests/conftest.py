@@ -69,7 +69,7 @@ KINDS = {
 
 # What takes longest comes first, so that several test processes end together.
 LONGEST = (
-    "train/test_every_experiment.py",
+    "train/test_experiments.py",
     "service/http/test_serve.py",
     "test_wheel.py",
     "conformance/test_conformance.py",

@@ -11,7 +11,7 @@ import torch
 from export.model_file import export_model
 from pns_common import Mesh, load_model, loop, pns, refine
 from train.data import pair_store, shape_library
-from train.data.primitives import icosphere
+from train.data.icosphere import icosphere
 from train.data.shape_library import ListedShape, read_arrays, sum_of, take_shapes
 from train.fitting.control_mesh import ControlMesh
 from train.fitting.trainer import fit

@@ -13,7 +13,7 @@ from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
 from train.connectivity import Connectivity, connect
-from train.data.primitives import icosphere
+from train.data.icosphere import icosphere
 from train.loop_masks import Mask, limit_mask, loop_mask
 from train.reference import (
     EDGE_FEATURES,

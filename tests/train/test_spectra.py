@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import torch
 
-from pns_common import ParameterError, loop, pns
+from pns_common import ParameterError, Scheme, loop, pns
 from train.certificates.adversary import Operator
 from train.certificates.gap_collapse import margin_gradient, operator_jacobian
 from train.models.from_recipe import initial_network
 from train.models.networks import BoundedNet
 from train.models.recipes import paper, signed
 from train.models.torch_model import recipe_model
-from train.refining import Method, loop_rule
+from train.refining import additions
 from train.spectra.spectrum import (
     SPOKE,
     VALENCES,
@@ -102,16 +102,18 @@ def test_the_margins_gradient_is_its_derivative():
 def far_sighted(rings):
     """Loop, and on every edge a pull towards the vertices that are `rings` rings of edges away."""
 
-    def step(points, mesh, reference_length):
-        base = loop_rule(points, mesh, reference_length)
-        smooth = torch.eye(mesh.vertex_count).double()
-        smooth[mesh.centres, mesh.rims] = 1
-        seen = torch.linalg.matrix_power(smooth, rings)
-        pull = (seen / seen.sum(dim=1, keepdim=True)) @ points
-        towards = torch.cat([base.base[: len(points)], pull[mesh.edges].mean(dim=1)])
-        return replace(base, displacement=0.01 * (towards - base.base))
+    def rule(level):
+        edges, count = level.topology.edges.astype(int), len(level.points)
+        near = np.eye(count)
+        near[edges[:, 0], edges[:, 1]] = near[edges[:, 1], edges[:, 0]] = 1
+        seen = np.linalg.matrix_power(near, rings)
+        pull = (seen / seen.sum(axis=1, keepdims=True)) @ level.points
+        base = level.base.place(level.points, level.topology, level.blocks)
+        moved = 0.01 * (pull[edges].mean(axis=1) - base[count:])
+        none = np.zeros(len(base))
+        return additions(level, np.concatenate([np.zeros((count, 3)), moved]), none, none)
 
-    return Method("far-sighted", step)
+    return Scheme("far-sighted", rule=rule, learned_levels=None)
 
 
 def test_a_rule_that_sees_further_gets_more_rings():
