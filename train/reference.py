@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from train.connectivity import Connectivity
-from train.loop_masks import loop_mask
+from train.loop_masks import loop_points
 from train.tensors import dot, ratio, root, shortened, unit
 
 # Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), and a
@@ -212,7 +212,7 @@ def on_edges(
     """Return Loop's step with something added to edge vertices."""
     none = points.new_zeros(mesh.vertex_count)
     return Step(
-        loop_mask(mesh)(points),
+        loop_points(points, mesh),
         torch.cat([torch.zeros_like(points), displacement]),
         torch.cat([none, envelope]),
         torch.cat([none, gate]),

@@ -87,11 +87,16 @@ def additions(
 
 
 def torch_rule(step: Callable[[Float[Tensor, "V 3"], Connectivity, float], Step]) -> Rule:
-    """Return a rule that takes a step in torch, from points, connectivity and R."""
+    """Return a rule that takes a step in torch, from points, connectivity and R.
+
+    Edges are smooth or creases: the step sees no sharpness between.
+    """
 
     def rule(level: Level) -> Additions:
         assert level.reference_length is not None  # the library measures it for every rule
-        mesh = connect(level.topology.faces, len(level.points))
+        topology = level.topology
+        creases = topology.edges[topology.crease_edges].astype(np.int64)
+        mesh = connect(topology.faces, len(level.points), creases)
         with torch.no_grad():
             made = step(torch.tensor(level.points), mesh, level.reference_length)
         return additions(level, made.displacement.numpy(), made.envelope.numpy(), made.gate.numpy())

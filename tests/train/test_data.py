@@ -39,7 +39,7 @@ from train.data.pairs.polygons import is_manifold as is_manifold_of_polygons
 from train.data.pairs.references import patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
 from train.data.sharp_labels import coarse_sharp_edges, sharp_edges
-from train.data.simplifiers import SIMPLIFIERS, simplified
+from train.data.simplifiers import SIMPLIFIERS
 from train.data.validation import coarse_mesh, read_shape, validation_meshes
 from train.surfaces.brep import box, chamfered, cut, cylinder, edge_groups, filleted, tessellated
 from train.surfaces.implicit import Ridge, Saddle, SphereRidge, signed_distance, unit_normal
@@ -231,7 +231,7 @@ def test_triangles_of_a_drum_are_joined_to_its_quads_and_lids():
 def test_simplifiers_come_near_the_target_stay_on_the_sphere_and_give_the_same_again(name):
     sphere = icosphere(4)
     for faces in (100, 500):
-        coarse, again = (simplified(sphere, SIMPLIFIERS[name], faces) for _ in range(2))
+        coarse, again = (SIMPLIFIERS[name](sphere, faces) for _ in range(2))
         assert faces / 1.6 <= len(coarse.faces) <= 1.6 * faces
         assert np.abs(np.linalg.norm(coarse.vertices, axis=1) - 1).max() < 0.15
         np.testing.assert_array_equal(coarse.vertices, again.vertices)

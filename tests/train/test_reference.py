@@ -1,5 +1,7 @@
 """The kernels agree with the formula written once more in torch, on every class of edge."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -12,9 +14,9 @@ from pns_common.operator.formula import edge_inputs
 from pns_common.operator.level import Level
 from pns_common.parallel import Blocks
 from pns_common.schemes.loop import LOOP
-from train.connectivity import Connectivity, connect
+from train.connectivity import connect
 from train.data.icosphere import icosphere
-from train.loop_masks import Mask, limit_mask, loop_mask
+from train.loop_masks import loop_points
 from train.reference import (
     EDGE_FEATURES,
     PaperRule,
@@ -88,18 +90,12 @@ def test_edges_faces_and_rings_agree(both):
     np.testing.assert_array_equal(mesh.split(), split.faces)
 
 
-def test_loop_and_its_limit_agree(both):
-    from pns_common.schemes.limit import limit_positions
-
+def test_loops_masks_agree(both):
     _, level, points, mesh = both
     topology = level.topology
     np.testing.assert_allclose(
-        loop_mask(mesh)(points), LOOP.place(level.points, topology, Blocks()), **CLOSE
+        loop_points(points, mesh), LOOP.place(level.points, topology, Blocks()), **CLOSE
     )
-    if (mesh.edges[:, 0] != mesh.edges[:, 1]).all():
-        np.testing.assert_allclose(
-            limit_mask(mesh)(points), limit_positions(level.points, topology), **CLOSE
-        )
 
 
 @pytest.mark.parametrize("name", EDGE_FEATURES)
@@ -148,22 +144,12 @@ def test_gradients_through_positions_are_derivatives():
     )
 
 
-def blended(mesh: Connectivity, sharpness) -> tuple[Connectivity, Mask]:
-    """Return a mesh with other sharpness where edges have two faces, and Loop's mask there."""
-    from dataclasses import replace
-
-    w = torch.where(mesh.paired, sharpness, 1.0)
-    made = replace(mesh, sharpness=w)
-    return made, loop_mask(made)
-
-
 def test_soft_masks_agree_with_the_kernels():
     points, faces, _ = random_mesh(1)
     mesh = connect(faces, len(points))
     sharpness = torch.rand(len(mesh.edges), generator=torch.Generator().manual_seed(3)).double()
     topology = build_topology(faces, len(points)).with_sharpness(sharpness.numpy())
+    soft = replace(mesh, sharpness=torch.where(mesh.paired, sharpness, 1.0))
     np.testing.assert_allclose(
-        blended(mesh, sharpness)[1](torch.tensor(points)),
-        LOOP.place(points, topology, Blocks()),
-        **CLOSE,
+        loop_points(torch.tensor(points), soft), LOOP.place(points, topology, Blocks()), **CLOSE
     )
