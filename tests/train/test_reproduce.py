@@ -41,10 +41,6 @@ class Counting:
         )
 
 
-# The key reads the source of the module that the experiment's function lives in.
-Counting.__module__ = "train.experiments.paper.headline"
-
-
 @pytest.fixture
 def counting():
     return Counting()
@@ -59,48 +55,42 @@ def laboratory(tmp_path, scale=SMALL, checkpoints=None, published=None):
     return Laboratory(scale, tmp_path / "networks", checkpoints, published)
 
 
-def test_a_finished_experiment_is_not_run_again(tmp_path, counting, experiment):
-    first = reproduce(experiment, laboratory(tmp_path), tmp_path)
-    second = reproduce(experiment, laboratory(tmp_path), tmp_path)
-    assert counting.runs == 1
-    assert second == first
-    reproduce(experiment, laboratory(tmp_path), tmp_path, force=True)
-    assert counting.runs == 2
+def test_a_finished_experiment_is_run_again_where_anything_of_it_is_another(
+    tmp_path, counting, experiment
+):
+    def run(**options):
+        return reproduce(experiment, laboratory(tmp_path), tmp_path, **options), counting.runs
 
-
-def test_a_missing_file_or_a_broken_record_makes_it_run_again(tmp_path, counting, experiment):
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    (tmp_path / "counted.csv").unlink()
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    (tmp_path / "figures" / "line.pdf").unlink()
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    first, runs = run()
+    assert (run(), runs) == ((first, 1), 1)
+    assert run(force=True)[1] == 2
     record = tmp_path / "cache" / "counting.json"
+    for number, path in enumerate(("counted.csv", "figures/line.pdf"), start=3):
+        (tmp_path / path).unlink()
+        assert run()[1] == number
     record.write_text("{}")
     assert read_record(record) is None
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    assert counting.runs == 4
-
-
-def test_other_inputs_make_it_run_again(tmp_path, counting, experiment):
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    assert run()[1] == 5
     reproduce(experiment, laboratory(tmp_path, scale=replace(SMALL, levels=3)), tmp_path)
-    assert counting.runs == 2
-    checkpoints = tmp_path / "given"
-    checkpoints.mkdir()
-    key = content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints))
-    (checkpoints / "paper.safetensors").write_bytes(b"other weights")
-    assert content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints)) != key
+    assert counting.runs == 6
+
+
+def test_weights_that_are_given_count_as_inputs(tmp_path, experiment):
     needing = replace(experiment, needs_published=True)
-    key = content_key(needing, laboratory(tmp_path, published=checkpoints))
-    (checkpoints / "weights.npz").write_bytes(b"other weights")
-    assert content_key(needing, laboratory(tmp_path, published=checkpoints)) != key
+    for given in ("checkpoints", "published"):
+        folder = tmp_path / given
+        folder.mkdir()
+        keys = set()
+        for content in (b"weights", b"other weights"):
+            (folder / "paper.safetensors").write_bytes(content)
+            keys.add(content_key(needing, laboratory(tmp_path, **{given: folder})))
+        assert len(keys) == 2
 
 
-def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, counting, experiment):
+def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, experiment):
     def broken(_):
         raise KeyboardInterrupt
 
-    broken.__module__ = Counting.__module__
     with pytest.raises(KeyboardInterrupt):
         reproduce(replace(experiment, run=broken), laboratory(tmp_path), tmp_path)
     assert not (tmp_path / "cache" / "counting.json").exists()

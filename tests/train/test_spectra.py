@@ -24,21 +24,9 @@ from train.spectra.spectrum import (
     follow_lift,
     jacobian,
     loop_gap,
-    quotient_blocks,
     without_translations,
 )
 from train.spectra.stars import keeps_blocks, star, symmetry_blocks
-
-
-def ring_matrix(k):
-    """Loop on a k-star of one ring, written out from its masks."""
-    keep = 3 / 8 + (3 / 8 + math.cos(2 * math.pi / k) / 4) ** 2
-    matrix = np.zeros((k + 1, k + 1))
-    matrix[0, 0], matrix[0, 1:] = keep, (1 - keep) / k
-    for i in range(k):
-        matrix[1 + i, [0, 1 + i]] = 3 / 8
-        matrix[1 + i, [1 + (i + 1) % k, 1 + (i - 1) % k]] = 1 / 8
-    return matrix
 
 
 def steep_network(seed=0, scale=4.0):
@@ -48,16 +36,6 @@ def steep_network(seed=0, scale=4.0):
         for weight in network.parameters():
             weight *= scale
     return network
-
-
-@pytest.mark.parametrize("k", VALENCES)
-def test_loops_first_ring_matches_its_masks(k):
-    fan = star(k, 2, SPOKE)
-    matrix = jacobian(loop(), fan)
-    ring = 3 * (k + 1)
-    expected = np.kron(ring_matrix(k), np.eye(3))
-    np.testing.assert_allclose(matrix[:ring, :ring], expected, atol=1e-10)
-    np.testing.assert_allclose(matrix[:ring, ring:], 0, atol=1e-10)
 
 
 @pytest.mark.parametrize("k", VALENCES)
@@ -79,13 +57,6 @@ def test_differences_agree_with_autograd_through_the_kernels(lift):
         assert np.abs(exact - base).max() > 1e-3
     else:
         np.testing.assert_allclose(exact, base, atol=1e-10)
-
-
-def test_the_margin_is_continuous_in_the_lift():
-    scheme = pns(recipe_model(paper(), steep_network(scale=1.0)))
-    coarse = follow_lift(scheme, 6, np.linspace(0, 0.4, 5))[-1].margin
-    fine = follow_lift(scheme, 6, np.linspace(0, 0.4, 17))[-1].margin
-    assert coarse == pytest.approx(fine, abs=1e-9)
 
 
 def test_the_margins_gradient_is_its_derivative():
@@ -134,18 +105,6 @@ def test_symmetric_rules_keep_the_blocks_of_lifted_stars(valence):
     blocks = symmetry_blocks(fan, valence)
     assert keeps_blocks(jacobian(loop(), fan), blocks)
     assert keeps_blocks(jacobian(SYMMETRIC, fan), blocks)
-
-
-@pytest.mark.parametrize("valence", [3, 4, 5])
-def test_blocks_have_the_whole_spectrum(valence):
-    fan = star(valence, 4, SPOKE, 0.2, inner_rings=3)
-    matrix = without_translations(jacobian(SYMMETRIC, fan))
-    flat = flat_spectrum(matrix, valence, quotient_blocks(fan, valence))
-    expected = np.linalg.eigvals(matrix)
-    assert len(flat.values) == len(expected)
-    for value in expected:
-        assert np.abs(flat.values - value).min() < 1e-5
-    np.testing.assert_allclose((flat.right * flat.values @ flat.left).real, matrix, atol=1e-7)
 
 
 def test_eigenvalues_that_cross_from_different_blocks_are_told_apart():
