@@ -1,4 +1,4 @@
-"""What is trained and validated on: surfaces, pairs, simplified shapes, files of one's own."""
+"""Surfaces, pairs, simplified shapes and files: what training and validation are made of."""
 
 from functools import cache
 from itertools import islice

@@ -1,4 +1,4 @@
-"""What baselines place, measured against the base scheme as PNS is."""
+"""Steps of baselines, measured against the base scheme as PNS is."""
 
 import numpy as np
 from jaxtyping import Float, Int
