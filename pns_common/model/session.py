@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -135,6 +135,10 @@ class OnnxModel:
             session.get_modelmeta().custom_metadata_map[CARD_KEY]
         )
         self._networks = {network.given: network for network in networks(self.card)}
+        self._unread = {
+            network.given: np.zeros((1, network.columns), dtype=np.float32)
+            for network in self._networks.values()
+        }
 
     def __repr__(self) -> str:
         return f"OnnxModel(name={self.name!r}, hash={self.hash!r})"
@@ -199,18 +203,14 @@ class OnnxModel:
         return rows[: count + -count % ROW_MULTIPLE]
 
     def _unread_inputs(self, budget: float) -> dict[str, np.ndarray]:
-        """Return the budget, and one row for each input of features: onnxruntime asks for all."""
-        rows = {
-            network.given: np.zeros((1, network.columns), dtype=np.float32)
-            for network in self._networks.values()
-        }
+        """Return the budget, or a row for each input of features: onnxruntime asks for all."""
         if self.card.format == DIRECTED_FORMAT:
-            return rows
-        return {**rows, "budget": np.asarray(budget, dtype=np.float32)}
+            return self._unread.copy()
+        return {"budget": np.asarray(budget, dtype=np.float32)}
 
-    def _run(self, session: Any, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _run(self, session: Any, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:
-            (answer,) = session.run([output], dict(inputs))
+            (answer,) = session.run([output], inputs)
         except Exception as error:  # onnxruntime's errors share no base below Exception
             raise ModelError(
                 self.name, expected="a graph that runs to its end", found=_first_line(error)

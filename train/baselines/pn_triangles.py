@@ -7,12 +7,12 @@ tangent of the crease.
 """
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pns_common import Scheme
-from pns_common.kernels.connectivity import BOUNDARY, INTERIOR
+from pns_common.kernels.connectivity import BOUNDARY, CREASE, INTERIOR
 from pns_common.operator.formula import Additions
 from pns_common.operator.level import Level
 from train.baselines.placement import edges_of, midpoints, placed_edges, vertex_normals
@@ -32,7 +32,7 @@ def pn_triangles(split: float | None = None) -> Scheme:
     def rule(level: Level) -> Additions:
         ends = edges_of(level)
         start, end = level.points[ends].transpose(1, 0, 2)
-        whole = level.topology.edge_class == INTERIOR
+        whole = _paired(level)
         if split is None:
             normals = vertex_normals(level)[ends]
             near_start = cubic_control_point(start, end, normals[:, 0])
@@ -50,6 +50,11 @@ def pn_triangles(split: float | None = None) -> Scheme:
     return Scheme("pn-triangles", rule=rule, learned_levels=None)
 
 
+def _paired(level: Level) -> Bool[np.ndarray, " E"]:
+    """Return which edges lie between two faces, as creases do too."""
+    return np.isin(level.topology.edge_class, (INTERIOR, CREASE))
+
+
 def cubic_control_point(
     start: Float[np.ndarray, "N 3"], end: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, "N 3"]:
@@ -63,7 +68,7 @@ def _corner_normals(level: Level, least: float) -> Float[np.ndarray, "H 3"]:
     An edge is smooth where the normals of its faces have at least this inner product.
     """
     topology, count = level.topology, len(level.topology.corners)
-    here, there = topology.half_edges[topology.interior].T
+    here, there = topology.half_edges[_paired(level)].T
     smooth = dot(level.normals[here // 3], level.normals[there // 3]) >= least
     here, there = here[smooth], there[smooth]
     ends = np.append(here, next_corner(here)), np.append(next_corner(there), there)
