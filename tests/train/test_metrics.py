@@ -210,3 +210,14 @@ def test_a_wall_of_rulings_does_not_cross_itself_by_rounding():
     noise = 1e-11 * rng.normal(size=points.shape)
     wall = Mesh(points @ rotation(rng) + noise, grid(9)[1])
     assert not crossing_faces(wall).any()
+
+
+@pytest.mark.parametrize(("low", "crosses"), [(-1.0, True), (0.0, False), (None, False)])
+def test_faces_that_touch_or_overlap_in_one_plane_do_not_cross(low, crosses):
+    """A triangle that reaches down to a height over another one; None: it lies on it."""
+    flat = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0.0]])
+    other = np.array([[1, 1, 0], [2, 1, 0], [1, 2, 0.0]])
+    if low is not None:
+        other = np.array([[1, 1, low], [2, 1, 1], [1, 2, 1]])
+    mesh = Mesh(np.concatenate([flat, other]), np.arange(6).reshape(2, 3))
+    assert crossing_faces(mesh).tolist() == [crosses, crosses]

@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 
 import train.experiments.command as command
 import train.run
+from train.experiments.harness import reproduce as harness
 from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
-from train.experiments.harness.laboratory import SMALL, Laboratory
+from train.experiments.harness.laboratory import SMALL, Laboratory, code
 from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import content_key, read_record, reproduce
 from train.experiments.harness.style import panels
@@ -75,7 +76,7 @@ def test_a_finished_experiment_is_run_again_where_anything_of_it_is_another(
     assert counting.runs == 6
 
 
-def test_weights_that_are_given_count_as_inputs(tmp_path, experiment):
+def test_code_and_weights_that_are_given_count_as_inputs(tmp_path, monkeypatch, experiment):
     needing = replace(experiment, needs_published=True)
     for given in ("checkpoints", "published"):
         folder = tmp_path / given
@@ -85,6 +86,9 @@ def test_weights_that_are_given_count_as_inputs(tmp_path, experiment):
             (folder / "paper.safetensors").write_bytes(content)
             keys.add(content_key(needing, laboratory(tmp_path, **{given: folder})))
         assert len(keys) == 2
+    assert code() == code()
+    monkeypatch.setattr(harness, "code", lambda: b"other code")
+    assert content_key(needing, laboratory(tmp_path, published=folder)) not in keys
 
 
 def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, experiment):
