@@ -83,8 +83,8 @@ LONGEST = (
     "docs/test_site.py",
     "train/test_adversaries.py",
     "train/test_certificates.py",
-    "train/test_pairs.py",
-    "train/test_train_command.py",
+    "train/test_data.py",
+    "train/test_training.py",
 )
 
 
