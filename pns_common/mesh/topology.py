@@ -162,11 +162,6 @@ class Topology:
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
     @property
-    def wears(self) -> Bool[np.ndarray, " E"]:
-        """Flags of the edges that are sharp for so many levels."""
-        return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
-
-    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
