@@ -42,17 +42,6 @@ def skipped_block(rows, reach, block, begin, end):
     return first, last - first if inside else 0
 
 
-@kernel
-def find_reach(vertices: u4_1d, each: int, reach: i8_2d):
-    """Write the smallest and the largest of each block of so many vertices."""
-    for block in range(reach.shape[0]):
-        first = each * block
-        low = high = vertices[first]
-        for h in range(first, min(first + each, vertices.shape[0])):
-            low, high = min(low, vertices[h]), max(high, vertices[h])
-        reach[block, 0], reach[block, 1] = low, high
-
-
 # Columns of a link: the edge's higher vertex, the next link of the chain, its half-edges.
 HIGH, NEXT, FIRST, SECOND = 0, 1, 2, 3
 

@@ -367,7 +367,8 @@ def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _faces_of(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray | None, int | None]:
     """Return corners, offsets, and the degree of all faces; no offsets of a table's rows."""
-    several, degree = isinstance(faces, list | tuple), None
+    several = isinstance(faces, list | tuple)
+    degree: int | None = None
     given: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
     rows = [_array(face, "faces") for face in given]
     degrees = [face.size for face in rows]

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Integer, UInt32
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import connectivity as kernels
 from pns_common.kernels import loop
-from pns_common.parallel import Blocks
+from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
 STEPS = 32
@@ -162,11 +162,6 @@ class Topology:
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
     @property
-    def wears(self) -> Bool[np.ndarray, " E"]:
-        """Flags of the edges that are sharp for so many levels."""
-        return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
-
-    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
@@ -197,9 +192,10 @@ class Topology:
                 at_ends, beside = self._sharpest_of(marked)
                 weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
         if self.has_corners:
-            corner = self.corner_weights[:, None]
-            weights *= 1 - corner
-            weights += corner
+            corner = self.corner_weights
+            rows = np.flatnonzero(corner)
+            corner = corner[rows, None]
+            weights[rows] = corner + (1 - corner) * weights[rows]
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
     def _sharpest_of(
@@ -219,12 +215,12 @@ class Topology:
     @cached_property
     def edge_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of edges."""
-        return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS)
+        return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
     def corner_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of corners."""
-        return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS)
+        return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
@@ -468,7 +464,8 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     child_soft = NO_WEIGHTS
     if inherit and len(soft):
         child_soft = np.zeros(count)
-        child_soft[halves] = soft[:, None]
+        rows = np.flatnonzero(soft)
+        child_soft[halves[rows]] = soft[rows, None]
     made = Topology(
         vertex_count,
         faces.reshape(-1),
@@ -587,7 +584,12 @@ def _keys(pairs: Integer[np.ndarray, "N 2"], vertex_count: int) -> Integer[np.nd
     return wide.min(axis=1) * vertex_count + wide.max(axis=1)
 
 
-def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Integer[np.ndarray, "B 2"]:
-    made = np.empty((-(-len(vertices) // each), 2), dtype=np.int64)
-    kernels.find_reach(vertices, each, made)
+def _reach(vertices: UInt32[np.ndarray, " N"], each: int, count: int) -> Integer[np.ndarray, "B 2"]:
+    starts = np.arange(0, len(vertices), each)
+    made = np.zeros((len(starts), 2), dtype=np.int64)
+    if count < 2 * LEAST_ROWS:  # one thread reads all
+        made[:, 1] = count
+        return made
+    made[:, 0] = np.minimum.reduceat(vertices, starts)
+    made[:, 1] = np.maximum.reduceat(vertices, starts)
     return made

@@ -168,7 +168,10 @@ class OnnxModel:
         if rows.ndim != 2 or rows.shape[1] != network.columns:
             expected = f"an array of shape (N, {network.columns})"
             raise ParameterError(given, rows.shape, expected=expected)
-        session, inputs = self._session(), self._unread_inputs(budget)
+        # onnxruntime asks for all inputs: a row for those that are not read.
+        session, inputs = self._session(), self._unread.copy()
+        if self.card.format != DIRECTED_FORMAT:
+            inputs["budget"] = np.asarray(budget, dtype=np.float32)
         chunks = list[np.ndarray]()
         for start in range(0, max(len(rows), 1), CHUNK_ROWS):
             chunk = rows[start : start + CHUNK_ROWS]
@@ -201,12 +204,6 @@ class OnnxModel:
         rows = kept[network.given]
         rows[:count] = chunk
         return rows[: count + -count % ROW_MULTIPLE]
-
-    def _unread_inputs(self, budget: float) -> dict[str, np.ndarray]:
-        """Return the budget, or a row for each input of features: onnxruntime asks for all."""
-        if self.card.format == DIRECTED_FORMAT:
-            return self._unread.copy()
-        return {"budget": np.asarray(budget, dtype=np.float32)}
 
     def _run(self, session: Any, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:

@@ -155,7 +155,6 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
                 own[rows] = heads[:, column]
 
     level.blocks.of_rows(EDGES_AT_ONCE).run(count, answer)
-    del states
     of_vertices, vertex_logits = np.empty(level.points.shape), np.empty(mesh.vertex_count)
     read = of_leaving, corner_logits, starts, leaving
     level.blocks.quiet().run(

@@ -34,7 +34,7 @@ from .mesh_file import (
     as_fractions,
     dropped,
 )
-from .text import NUMBER, rows_text, whole_rows
+from .text import NUMBER, rows_text
 
 UNIT = "millimeter"
 # Its units in metres, those of a glTF.
@@ -428,36 +428,39 @@ def write_3mf(mesh: MeshFile) -> bytes:
     A material is as many base materials as it has faces of one colour; faces of several colours
     have these alone.
     """
-    groups, tables = _groups_of(mesh)
-    pieces = [
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<model unit="{mesh.unit or UNIT}" xmlns="{_CORE}" xmlns:m="{_MATERIAL}">\n<resources>\n',
-        *groups,
-    ]
-    numbers: list[int] = []
-    for name, chosen, vertices, corners in _objects_of(mesh):
-        numbers.append(len(numbers) + 3)
-        title = f" name={quoteattr(name)}" if name else ""
-        pieces.append(f'<object id="{numbers[-1]}" type="model"{title}><mesh><vertices>\n')
-        form = f'<vertex x="{NUMBER}" y="{NUMBER}" z="{NUMBER}"/>\n'
-        pieces += rows_text(form, mesh.vertices[vertices])
-        pieces.append("</vertices><triangles>\n")
-        pieces += _triangles_text(corners, tables[chosen])
-        pieces.append("</triangles></mesh></object>\n")
-    pieces.append("</resources>\n<build>\n")
-    pieces += [f'<item objectid="{number}"/>\n' for number in numbers]
-    pieces.append("</build>\n</model>\n")
     file = BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as package:
-        for name, text in (
-            ("[Content_Types].xml", _TYPES),
-            ("_rels/.rels", _RELATIONS),
-            (_ROOT, "".join(pieces)),
+    with zipfile.ZipFile(file, "w") as package:
+        for name, pieces in (
+            ("[Content_Types].xml", [_TYPES.encode()]),
+            ("_rels/.rels", [_RELATIONS.encode()]),
+            (_ROOT, _model_of(mesh)),
         ):
             entry = zipfile.ZipInfo(name, _WRITTEN)
             entry.compress_type = zipfile.ZIP_DEFLATED
-            package.writestr(entry, text.encode())
+            with package.open(entry, "w") as part:
+                for piece in pieces:
+                    part.write(piece)
     return file.getvalue()
+
+
+def _model_of(mesh: MeshFile) -> Iterator[bytes]:
+    groups, tables = _groups_of(mesh)
+    yield (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f'<model unit="{mesh.unit or UNIT}" xmlns="{_CORE}" xmlns:m="{_MATERIAL}">\n<resources>\n'
+        f"{''.join(groups)}"
+    ).encode()
+    items: list[str] = []
+    for number, (name, chosen, vertices, corners) in enumerate(_objects_of(mesh), start=3):
+        title = f" name={quoteattr(name)}" if name else ""
+        yield f'<object id="{number}" type="model"{title}><mesh><vertices>\n'.encode()
+        form = f'<vertex x="{NUMBER}" y="{NUMBER}" z="{NUMBER}"/>\n'
+        yield from rows_text(form, mesh.vertices[vertices])
+        yield b"</vertices><triangles>\n"
+        yield from _triangles_text(corners, tables[chosen])
+        yield b"</triangles></mesh></object>\n"
+        items.append(f'<item objectid="{number}"/>\n')
+    yield f"</resources>\n<build>\n{''.join(items)}</build>\n</model>\n".encode()
 
 
 def vertices_of_objects(mesh: MeshFile) -> Int[np.ndarray, " W"]:
@@ -542,16 +545,18 @@ def _hex(colour: UInt8[np.ndarray, " 4"]) -> str:
     return f'"#{colour.tobytes().hex().upper()}"'
 
 
-def _triangles_text(faces: Int[np.ndarray, "F 3"], table: Int[np.ndarray, "F 4"]) -> Iterator[str]:
+def _triangles_text(
+    faces: Int[np.ndarray, "F 3"], table: Int[np.ndarray, "F 4"]
+) -> Iterator[bytes]:
     """Write triangles in their order; those that follow each other with one group together."""
-    vertices = b'<triangle v1="%" v2="%" v3="%"'
+    vertices = '<triangle v1="%d" v2="%d" v3="%d"'
     forms = {
-        0: vertices + b"/>\n",
-        1: vertices + b' pid="1" p1="%"/>\n',
-        2: vertices + b' pid="2" p1="%" p2="%" p3="%"/>\n',
+        0: vertices + "/>\n",
+        1: vertices + ' pid="1" p1="%d"/>\n',
+        2: vertices + ' pid="2" p1="%d" p2="%d" p3="%d"/>\n',
     }
     turns = np.flatnonzero(np.diff(table[:, 0])) + 1
     for begin, end in pairwise([0, *turns.tolist(), len(faces)]):
         group = int(table[begin, 0])
         shown = table[begin:end, 1 : 1 + {0: 0, 1: 1, 2: 3}[group]]
-        yield from whole_rows(forms[group], np.hstack([faces[begin:end], shown]))
+        yield from rows_text(forms[group], np.hstack([faces[begin:end], shown]))

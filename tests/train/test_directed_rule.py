@@ -8,7 +8,6 @@ from pns_common import Creases, Scheme
 from pns_common.mesh.topology import build_topology
 from pns_common.operator import formula
 from pns_common.operator.directed import DirectedNetworks, ask, directed_features
-from train.fitting.control_mesh import by_way
 from pns_common.operator.level import Level
 from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks
@@ -17,6 +16,7 @@ from tests.support.networks import DEFAULT_CARD
 from tests.train.test_reference import SEEDS, random_mesh
 from train.connectivity import connect
 from train.directed_rule import DirectedEdges, DirectedRule
+from train.fitting.control_mesh import by_way
 from train.models.directed import DirectedNet
 from train.models.torch_model import answered, layers_of
 from train.reference import Surroundings

@@ -227,7 +227,7 @@ def _axes(level: Level) -> Float[np.ndarray, "D 3 3"]:
     return by_way(np.ascontiguousarray(made.transpose(1, 0, 2)))
 
 
-def by_way(rows: Float[np.ndarray, "D *K"]) -> Float[np.ndarray, "D *K"]:
+def by_way(rows: Float[np.ndarray, "D ..."]) -> Float[np.ndarray, "D ..."]:
     """Return the library's rows of directed edges as networks here read them: all a → b first."""
     return np.concatenate([rows[0::2], rows[1::2]])
 
