@@ -60,10 +60,13 @@ OF_ENDS, OF_CORNERS = 2 / 3, 1 / 2
 HALF = 1 / 2
 # All but the curve's own rule has so much weight on a curve at most, in units of 1 − w.
 OF_RING = 1.65
+# Regular patches: their corners' neighbours, and the largest sharpness of edges to these.
+REGULAR, SOFTEST = 6, 1 / 2
 # What control points of children reach is a little more than what the patch reaches: at least so
 # much, mostly. Bounds are near enough at NEAR times it, or BELOW it where that decides. Faces whose
-# own control points reach FAR times what is enough are to be split.
-LEAST, BELOW, NEAR, FAR = 0.85, 0.9, 1.05, 3.0
+# own control points reach FAR times what is enough are to be split. Patches reach at least TIGHT
+# times what the ordinates of regular ones do, if softness moves them by LITTLE times what is enough.
+LEAST, BELOW, NEAR, FAR, TIGHT, LITTLE = 0.85, 0.9, 1.05, 3.0, 0.93, 1 / 16
 
 
 @inlined
@@ -135,11 +138,17 @@ def find_star(corners, corner_edges, half_edges, edge_class, h, around, edges):
 
 
 @inlined
+def wrapped(i, count):
+    """Return i modulo a count that it is less than twice (a division takes longer than a star)."""
+    return i if i < count else i - count
+
+
+@inlined
 def curve_of(w, shape, r):
     """Return which two neighbours are on the curve through a star's centre."""
     k, gap = shape[r, DEGREE], shape[r, GAP]
     if gap >= 0:
-        return gap, (gap + 1) % k
+        return gap, wrapped(gap + 1, k)
     one, two = 0, 1
     if w[r, 1] > w[r, 0]:
         one, two = 1, 0
@@ -160,7 +169,7 @@ def refine_star(z, w, shape, beta, r, to):
         n = z[r, i]
         total += n
         middle = MIDPOINT * (p + n)
-        if gap >= 0 and (i == gap or i == (gap + 1) % k):
+        if gap >= 0 and (i == gap or i == wrapped(gap + 1, k)):
             to[r, i] = middle
             continue
         sides = z[r, i - 1 if i > 0 else k - 1] + z[r, i + 1 if i + 1 < k else 0]
@@ -196,18 +205,62 @@ def middle_star(placed, w, shape, x, y, turn, z, to):
     many = 4 if border else 6
     for i in range(many):
         w[to, i] = 0.0
-    own, other = (turn + 1) % many, (turn + many - 2) % many
+    own, other = wrapped(turn + 1, many), wrapped(turn + many - 2, many)
     z[to, turn], z[to, own] = placed[x, 1], placed[x, CENTRE]
-    z[to, other], z[to, (other + 1) % many] = placed[y, CENTRE], placed[y, 0]
+    z[to, other], z[to, wrapped(other + 1, many)] = placed[y, CENTRE], placed[y, 0]
     w[to, own], w[to, other] = sharp, sharp
     if not border:
-        z[to, (turn + 2) % many] = placed[x, k - 1]
-        z[to, (turn + 3) % many] = placed[y, 2 % shape[y, DEGREE]]
+        z[to, wrapped(turn + 2, many)] = placed[x, k - 1]
+        z[to, wrapped(turn + 3, many)] = placed[y, wrapped(2, shape[y, DEGREE])]
     z[to, CENTRE], w[to, SECOND], w[to, THIRD] = placed[x, 0], sharp, 0.0
     shape[to, DEGREE], shape[to, GAP] = many, own if border else -1
 
 
 # --- bounds ---------------------------------------------------------------------------------------
+
+
+@inlined
+def softness_of_regular(w, shape, r):
+    """Return the largest sharpness around a regular patch; −1 if it is not regular."""
+    most = 0.0
+    for c in range(r, r + 3):
+        if shape[c, DEGREE] != REGULAR or shape[c, GAP] >= 0 or w[c, THIRD] > 0:
+            return -1.0
+        straight = w[c, SECOND] == 0
+        for i in range(REGULAR):
+            most = max(most, w[c, i])
+            straight = straight or (w[c, i] > 0 and w[c, wrapped(i + 3, REGULAR)] > 0)
+        if not straight:
+            return -1.0
+    return most if most <= SOFTEST else -1.0
+
+
+@inlined
+def regular_bounds(z, r, softness, net, ordinates):
+    """Return bounds on the patch of a regular face, of the ordinates of its four quartics.
+
+    Return also how much of them softness may have moved.
+    """
+    for j in range(len(ordinates)):
+        ordinates[j] = 0.0
+    for k in range(3):
+        for i in range(4):
+            value = z[r + k, CENTRE if i == 0 else i + 1]
+            for j in range(len(ordinates)):
+                ordinates[j] += value * net[4 * k + i, j]
+    low, high = ordinates[0], ordinates[0]
+    for j in range(1, len(ordinates)):
+        low, high = min(low, ordinates[j]), max(high, ordinates[j])
+    bend = 0.0
+    if softness > 0:
+        for c in range(r, r + 3):
+            before, here = z[c, REGULAR - 1], z[c, 0]
+            for i in range(REGULAR):
+                after = z[c, wrapped(i + 1, REGULAR)]
+                bend = max(bend, abs(z[c, CENTRE] + here - before - after))
+                before, here = here, after
+    spare = softness * bend / (6 - 4 * softness)
+    return low - spare, high + spare, spare
 
 
 @inlined
@@ -272,11 +325,19 @@ def side_bounds(z, w, shape, r, side):
 
 
 @inlined
-def bounds(z, w, shape, r, side):
-    """Return bounds on a side, or on the patch if that is negative."""
+def bounds(z, w, shape, r, side, net, ordinates):
+    """Return bounds on a side, or on the patch if that is negative.
+
+    Return also what softness may have moved them by; −1 where they are those of a hull.
+    """
+    softness = softness_of_regular(w, shape, r) if side < 0 else -1.0
+    if softness >= 0:
+        return regular_bounds(z, r, softness, net, ordinates)
     if side < 0:
-        return patch_bounds(z, w, shape, r)
-    return side_bounds(z, w, shape, r, side)
+        low, high = patch_bounds(z, w, shape, r)
+    else:
+        low, high = side_bounds(z, w, shape, r, side)
+    return low, high, -1.0
 
 
 @inlined
@@ -291,29 +352,36 @@ def reached(placed, r):
 
 
 @inlined
-def explored(z, placed, w, shape, beta, child, sides, side, enough, steps):
+def explored(z, placed, w, shape, beta, net, ordinates, child, sides, side, enough, steps):
     """Return bounds of values on a patch or a side of a face, whose stars are the first three.
 
     Args:
         z, placed, w, shape: the face's stars, and room for those of its descendants.
-        child, sides: (DEEPEST + 1,) room.
+        beta, net: as of ``measure_faces``.
+        ordinates, child, sides: room.
         side: a side of the face; negative: the patch.
         enough: bounds below this are good enough.
         steps: so often faces may be refined.
     """
-    low, high = bounds(z, w, shape, 0, side)
+    if steps == 0:
+        return patch_bounds(z, w, shape, 0) if side < 0 else side_bounds(z, w, shape, 0, side)
+    low, high, spare = bounds(z, w, shape, 0, side, net, ordinates)
     worst, least = max(-low, high), 0.0
     if side < 0:
         least = min(abs(z[0, CENTRE]), abs(z[1, CENTRE]), abs(z[2, CENTRE]))
         if (z[0, CENTRE] > 0) != (z[1, CENTRE] > 0) or (z[0, CENTRE] > 0) != (z[2, CENTRE] > 0):
             least = 0.0
-    if steps == 0 or worst <= enough / 2 or (enough > 0 and least > FAR * enough):
+    if worst <= enough / 2 or (enough > 0 and least > FAR * enough):
+        return low, high
+    if spare >= 0 and (worst <= enough or TIGHT * (worst - spare) - spare > enough):
         return low, high
     lowest, highest, found_low, found_high = -enough / 2, enough / 2, math.inf, -math.inf
     level, sides[0], child[0] = 0, side, 0
     for c in range(3):
         refine_star(z, w, shape, beta, c, placed)
-    if side < 0:
+    if 0 <= spare <= LITTLE * enough:
+        lowest, highest, steps = -enough, enough, 1
+    elif side < 0:
         # Nearer than needed to tell whether it is to be split, and how it can be cut, takes long.
         lowest, highest = reached(placed, 0)
         far = max(-lowest, highest)
@@ -344,7 +412,7 @@ def explored(z, placed, w, shape, beta, child, sides, side, enough, steps):
         else:
             for k in range(3):
                 middle_star(placed, w, shape, r + k, r + (k + 1) % 3, 1, z, to + k)
-        down, up = bounds(z, w, shape, to, of_child)
+        down, up, _ = bounds(z, w, shape, to, of_child, net, ordinates)
         if level + 1 < steps and (max(down, low) < lowest or min(up, high) > highest):
             level += 1
             child[level], sides[level] = 0, of_child
@@ -375,6 +443,7 @@ def measure_faces(
     valence: i4_1d,
     rules: f8_2d,
     beta: f8_1d,
+    net: f8_2d,
     rows: i8_1d,
     triangles: f8_2d,
     compared: i4_2d,
@@ -383,6 +452,7 @@ def measure_faces(
     begin: int,
     end: int,
     numbers: f8_2d,
+    ordinates: f8_1d,
     whole: i8_2d,
     to: f8_2d,
 ):
@@ -395,6 +465,8 @@ def measure_faces(
         valence: (V,).
         rules: (V, 2) the weights of the rules of curves and of corners, and of the latter alone.
         beta: Loop's weight of one neighbour, for each valence.
+        net: (12, N) weights of a regular face's control points in the ordinates of its quartics:
+            of each corner, then of its neighbours 2, 3 and 4.
         rows: (N,) faces.
         triangles: (3 N, 3) corners of the triangles.
         compared: (N, 3) the triangle's side that each side of a face, from its corner on, is to be
@@ -402,6 +474,7 @@ def measure_faces(
         enough: bounds below this are good enough; 0: none is.
         steps: so often faces may be refined.
         numbers, whole: room of 9 (DEEPEST + 1) and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
+        ordinates: (N,) room.
         to: (N, 4) out: least and largest height over the triangle's plane; how far curves are from
             their sides; 1 where the bounds are not known.
     """
@@ -436,7 +509,9 @@ def measure_faces(
                     to[i, 1] = max(to[i, 1], norm(difference(row(points, around[c, j]), p)))
             continue
         set_values(points, corners, 3 * rows[i], around, shape, n, p, z)
-        low, high = explored(z, placed, w, shape, beta, child, sides, -1, enough, steps)
+        low, high = explored(
+            z, placed, w, shape, beta, net, ordinates, child, sides, -1, enough, steps
+        )
         to[i, 0], to[i, 1] = min(low, 0.0), max(high, 0.0)
         for k in range(3):
             s = compared[i, k]
@@ -449,6 +524,8 @@ def measure_faces(
             away = 0.0
             for direction in (n, across_it):
                 set_values(points, corners, 3 * rows[i], around, shape, direction, origin, z)
-                low, high = explored(z, placed, w, shape, beta, child, sides, k, enough, steps)
+                low, high = explored(
+                    z, placed, w, shape, beta, net, ordinates, child, sides, k, enough, steps
+                )
                 away += max(-low, high) ** 2
             to[i, 2] = max(to[i, 2], math.sqrt(away))
