@@ -194,15 +194,19 @@ class Topology:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
         loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        if len(self.soft) and len(self.soft_corners):
-            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
+        borders = self.edges[self.edge_class == kernels.BOUNDARY]
+        if len(self.soft) and len(self.soft_corners) and len(borders):
+            ends = np.zeros(self.vertex_count, dtype=bool)
+            ends[borders] = True
             at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
             marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
             loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)
             weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
         if self.has_corners:
-            corner = self.corner_weights[:, None]
-            weights = corner + (1 - corner) * weights
+            corner = self.corner_weights
+            rows = np.flatnonzero(corner)
+            corner = corner[rows, None]
+            weights[rows] = corner + (1 - corner) * weights[rows]
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
     @cached_property
