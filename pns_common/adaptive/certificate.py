@@ -18,7 +18,7 @@ from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part
 from pns_common.kernels import connectivity
 from pns_common.kernels import flatness as kernels
 from pns_common.mesh.creases import edge_cosines
-from pns_common.mesh.rows import marked
+from pns_common.mesh.rows import cross, dot, marked, unit
 from pns_common.schemes.loop_weights import beta
 
 # The side of a face that each side of its children is half of, from (a, ab, ca) on, or NO_SIDE.
@@ -50,7 +50,7 @@ def slabs(
         enough: slabs that are smaller need not be exact; 0: all need.
     """
     count, each = len(faces), CHILDREN**deeper
-    of_face = sides_of_descendants(deeper)
+    of_face = OF_CHILDREN if deeper else np.array([[0, 1, 2]])
     asked = np.hstack([sides, np.zeros((count, 1), dtype=bool)])[:, of_face]
     compared = np.ascontiguousarray(np.where(asked, of_face, -1).reshape(-1, 3), dtype=np.int32)
     about = triangles.repeat(each, axis=0)
@@ -59,15 +59,6 @@ def slabs(
     return np.column_stack(
         [made[:, :, LOW].min(axis=1), made[:, :, HIGH].max(axis=1), made[:, :, SIDE].max(axis=1)]
     )
-
-
-@cache
-def sides_of_descendants(deeper: int) -> Integer[np.ndarray, "D 3"]:
-    """Return the side of a face that each side of its descendants is a piece of, or NO_SIDE."""
-    made = np.array([[0, 1, 2]])
-    for _ in range(deeper):
-        made = np.hstack([made, np.full((len(made), 1), NO_SIDE)])[:, OF_CHILDREN].reshape(-1, 3)
-    return made
 
 
 @cache
@@ -119,10 +110,8 @@ def cut_distances(
     The cut raises a triangle by 0 to the point's height. Where that is not known (NaN) it lies in
     the slab, so both are apart by no more than the slab is wide.
     """
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(lengths > 0, lengths, 1.0)
-    height = np.einsum("ij,ij->i", middles - triangles[:, 0], normals)
+    a, b, c = (triangles[:, k] for k in range(3))
+    height = dot(middles - a, unit(cross(b - a, c - a)))
     low, high = slabs[:, LOW], slabs[:, HIGH]
     known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
     sizes = np.where(np.isnan(height), high - low, known)
@@ -154,7 +143,7 @@ def _measured(
 
     def work(begin: int, end: int) -> None:
         rows = kernels.DEEPEST + 1
-        numbers = np.zeros((9 * rows, kernels.WIDTH))
+        numbers = np.zeros((9 * rows + 3, kernels.WIDTH))
         whole = np.zeros((8 + 3 * rows, kernels.WIDTH), dtype=np.int64)
         ordinates = np.zeros(net.shape[1])
         kernels.measure_faces(*read, *rings, *asked, begin, end, numbers, ordinates, whole, made)

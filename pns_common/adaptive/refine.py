@@ -39,8 +39,8 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
-# The weights of a face's corners at its own, and at those of its halves: 2 k + 1 and 2 k + 2 are cut
-# at side k.
+# The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
+# are 2 k + 1 and 2 k + 2.
 HALVES = 0.5 * np.array(
     [
         [[2, 0, 0], [0, 2, 0], [0, 0, 2]],

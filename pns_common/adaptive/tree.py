@@ -117,7 +117,7 @@ class Tree:
 
     @property
     def measured(self) -> Sequence[Measured]:
-        """What is known of faces, level by level: it needs less memory than the tree."""
+        """Measurements of faces, level by level: they take less memory than the tree."""
         return [
             Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own])
             for layer in self.layers
@@ -287,7 +287,10 @@ class Start:
             codes = part.codes[rows]
             there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
             same = known.codes[there] == codes
-            errors[rows[same]], made[rows[same]] = known.errors[there[same]], known.slabs[there[same]]
+            errors[rows[same]], made[rows[same]] = (
+                known.errors[there][same],
+                known.slabs[there][same],
+            )
             rows = rows[~same]
         if len(rows):
             triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None

@@ -9,8 +9,10 @@ those three, o at others on this side, and b beyond is at most
 
 and the like from below. On a sharp curve both ends have two thirds of the weight.
 
-Where that is too much, values of the function are refined around the face, and its four children
-are bounded, up to ``DEEPEST`` times. A face is three stars: a corner with its neighbours,
+Patches of regular faces are quartics, and lie between their Bernstein ordinates.
+
+Where neither is near enough, values of the function are refined around the face, and its four
+children are bounded, up to ``DEEPEST`` times. A face is three stars: a corner with its neighbours,
 anticlockwise from the next corner on. All that is refined of a star follows from the star.
 """
 
@@ -65,7 +67,7 @@ REGULAR, SOFTEST = 6, 1 / 2
 # What control points of children reach is a little more than what the patch reaches: at least so
 # much, mostly. Bounds are near enough at NEAR times it, or BELOW it where that decides. Faces whose
 # own control points reach FAR times what is enough are to be split. Patches reach at least TIGHT
-# times what the ordinates of regular ones do, if softness moves them by LITTLE times what is enough.
+# times what the ordinates of regular ones do. LITTLE: softness moves these by little.
 LEAST, BELOW, NEAR, FAR, TIGHT, LITTLE = 0.85, 0.9, 1.05, 3.0, 0.93, 1 / 16
 
 
@@ -220,23 +222,43 @@ def middle_star(placed, w, shape, x, y, turn, z, to):
 
 
 @inlined
-def softness_of_regular(w, shape, r):
-    """Return the largest sharpness around a regular patch; −1 if it is not regular."""
-    most = 0.0
-    for c in range(r, r + 3):
-        if shape[c, DEGREE] != REGULAR or shape[c, GAP] >= 0 or w[c, THIRD] > 0:
-            return -1.0
-        straight = w[c, SECOND] == 0
-        for i in range(REGULAR):
-            most = max(most, w[c, i])
+def regular_star(z, w, shape, c, to, k):
+    """Write a star of six neighbours for one whose patches are the same by smooth rules alone.
+
+    What lies beyond a curve is such that the smooth rules give the curve's. Return the largest
+    sharpness of other edges; 1 if there is no such star.
+    """
+    many, gap, curve, most = shape[c, DEGREE], shape[c, GAP], -1, 0.0
+    if w[c, THIRD] > 0 or many != (REGULAR if gap < 0 else REGULAR - 2):
+        return 1.0
+    if w[c, SECOND] >= 1:
+        # The spoke of the curve before what lies beyond, which the face does not.
+        curve = gap if gap >= 0 else 0
+        while gap < 0 and curve < 3 and (w[c, curve] < 1 or w[c, curve + 3] < 1):
+            curve += 1
+        if gap < 0 and curve == 3:
+            return 1.0
+        curve = 3 if curve == 0 else curve
+    elif gap >= 0:
+        return 1.0
+    straight = curve >= 0 or w[c, SECOND] == 0
+    for i in range(many):
+        j = i + 2 if gap >= 0 and i > gap else i
+        to[k, j] = z[c, i]
+        if curve < 0:
             straight = straight or (w[c, i] > 0 and w[c, wrapped(i + 3, REGULAR)] > 0)
-        if not straight:
-            return -1.0
-    return most if most <= SOFTEST else -1.0
+        if curve < 0 or not (curve <= j <= curve + 3 or j == curve - 3):
+            most = max(most, w[c, i])
+    if curve >= 0:
+        far = wrapped(curve + 3, REGULAR)
+        to[k, curve + 1] = z[c, CENTRE] + to[k, curve] - to[k, curve - 1]
+        to[k, curve + 2] = z[c, CENTRE] + to[k, far] - to[k, wrapped(far + 1, REGULAR)]
+    to[k, REGULAR] = z[c, CENTRE]
+    return most if straight else 1.0
 
 
 @inlined
-def regular_bounds(z, r, softness, net, ordinates):
+def regular_bounds(stars, softness, net, ordinates):
     """Return bounds on the patch of a regular face, of the ordinates of its four quartics.
 
     Return also how much of them softness may have moved.
@@ -245,7 +267,7 @@ def regular_bounds(z, r, softness, net, ordinates):
         ordinates[j] = 0.0
     for k in range(3):
         for i in range(4):
-            value = z[r + k, CENTRE if i == 0 else i + 1]
+            value = stars[k, REGULAR if i == 0 else i + 1]
             for j in range(len(ordinates)):
                 ordinates[j] += value * net[4 * k + i, j]
     low, high = ordinates[0], ordinates[0]
@@ -253,11 +275,11 @@ def regular_bounds(z, r, softness, net, ordinates):
         low, high = min(low, ordinates[j]), max(high, ordinates[j])
     bend = 0.0
     if softness > 0:
-        for c in range(r, r + 3):
-            before, here = z[c, REGULAR - 1], z[c, 0]
+        for k in range(3):
+            before, here = stars[k, REGULAR - 1], stars[k, 0]
             for i in range(REGULAR):
-                after = z[c, wrapped(i + 1, REGULAR)]
-                bend = max(bend, abs(z[c, CENTRE] + here - before - after))
+                after = stars[k, wrapped(i + 1, REGULAR)]
+                bend = max(bend, abs(stars[k, REGULAR] + here - before - after))
                 before, here = here, after
     spare = softness * bend / (6 - 4 * softness)
     return low - spare, high + spare, spare
@@ -325,15 +347,18 @@ def side_bounds(z, w, shape, r, side):
 
 
 @inlined
-def bounds(z, w, shape, r, side, net, ordinates):
+def bounds(z, w, shape, r, side, net, stars, ordinates):
     """Return bounds on a side, or on the patch if that is negative.
 
     Return also what softness may have moved them by; −1 where they are those of a hull.
     """
-    softness = softness_of_regular(w, shape, r) if side < 0 else -1.0
-    if softness >= 0:
-        return regular_bounds(z, r, softness, net, ordinates)
     if side < 0:
+        softness = regular_star(z, w, shape, r, stars, 0)
+        for k in range(1, 3):
+            if softness <= SOFTEST:
+                softness = max(softness, regular_star(z, w, shape, r + k, stars, k))
+        if softness <= SOFTEST:
+            return regular_bounds(stars, softness, net, ordinates)
         low, high = patch_bounds(z, w, shape, r)
     else:
         low, high = side_bounds(z, w, shape, r, side)
@@ -352,20 +377,20 @@ def reached(placed, r):
 
 
 @inlined
-def explored(z, placed, w, shape, beta, net, ordinates, child, sides, side, enough, steps):
+def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, side, enough, steps):
     """Return bounds of values on a patch or a side of a face, whose stars are the first three.
 
     Args:
         z, placed, w, shape: the face's stars, and room for those of its descendants.
         beta, net: as of ``measure_faces``.
-        ordinates, child, sides: room.
+        stars, ordinates, child, sides: room.
         side: a side of the face; negative: the patch.
         enough: bounds below this are good enough.
         steps: so often faces may be refined.
     """
     if steps == 0:
         return patch_bounds(z, w, shape, 0) if side < 0 else side_bounds(z, w, shape, 0, side)
-    low, high, spare = bounds(z, w, shape, 0, side, net, ordinates)
+    low, high, spare = bounds(z, w, shape, 0, side, net, stars, ordinates)
     worst, least = max(-low, high), 0.0
     if side < 0:
         least = min(abs(z[0, CENTRE]), abs(z[1, CENTRE]), abs(z[2, CENTRE]))
@@ -373,13 +398,14 @@ def explored(z, placed, w, shape, beta, net, ordinates, child, sides, side, enou
             least = 0.0
     if worst <= enough / 2 or (enough > 0 and least > FAR * enough):
         return low, high
-    if spare >= 0 and (worst <= enough or TIGHT * (worst - spare) - spare > enough):
+    over = TIGHT * (worst - spare) - spare > enough
+    if spare >= 0 and (worst <= enough or (over and (enough > 0 or spare <= LITTLE * worst))):
         return low, high
     lowest, highest, found_low, found_high = -enough / 2, enough / 2, math.inf, -math.inf
     level, sides[0], child[0] = 0, side, 0
     for c in range(3):
         refine_star(z, w, shape, beta, c, placed)
-    if 0 <= spare <= LITTLE * enough:
+    if 0 <= spare <= LITTLE * worst:
         lowest, highest, steps = -enough, enough, 1
     elif side < 0:
         # Nearer than needed to tell whether it is to be split, and how it can be cut, takes long.
@@ -412,7 +438,7 @@ def explored(z, placed, w, shape, beta, net, ordinates, child, sides, side, enou
         else:
             for k in range(3):
                 middle_star(placed, w, shape, r + k, r + (k + 1) % 3, 1, z, to + k)
-        down, up, _ = bounds(z, w, shape, to, of_child, net, ordinates)
+        down, up, _ = bounds(z, w, shape, to, of_child, net, stars, ordinates)
         if level + 1 < steps and (max(down, low) < lowest or min(up, high) > highest):
             level += 1
             child[level], sides[level] = 0, of_child
@@ -473,13 +499,14 @@ def measure_faces(
             compared with as a curve; −1: none.
         enough: bounds below this are good enough; 0: none is.
         steps: so often faces may be refined.
-        numbers, whole: room of 9 (DEEPEST + 1) and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
+        numbers, whole: room of 9 (DEEPEST + 1) + 3 and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
         ordinates: (N,) room.
         to: (N, 4) out: least and largest height over the triangle's plane; how far curves are from
             their sides; 1 where the bounds are not known.
     """
     each = 3 * (DEEPEST + 1)
-    z, placed, w = numbers[:each], numbers[each : 2 * each], numbers[2 * each :]
+    z, placed, w = numbers[:each], numbers[each : 2 * each], numbers[2 * each : 3 * each]
+    stars = numbers[3 * each :]
     around, edges, shape = whole[:3], whole[3:6], whole[6 : 6 + each]
     child, sides = whole[6 + each], whole[7 + each]
     for i in range(begin, end):
@@ -510,7 +537,7 @@ def measure_faces(
             continue
         set_values(points, corners, 3 * rows[i], around, shape, n, p, z)
         low, high = explored(
-            z, placed, w, shape, beta, net, ordinates, child, sides, -1, enough, steps
+            z, placed, w, shape, beta, net, stars, ordinates, child, sides, -1, enough, steps
         )
         to[i, 0], to[i, 1] = min(low, 0.0), max(high, 0.0)
         for k in range(3):
@@ -525,7 +552,7 @@ def measure_faces(
             for direction in (n, across_it):
                 set_values(points, corners, 3 * rows[i], around, shape, direction, origin, z)
                 low, high = explored(
-                    z, placed, w, shape, beta, net, ordinates, child, sides, k, enough, steps
+                    z, placed, w, shape, beta, net, stars, ordinates, child, sides, k, enough, steps
                 )
                 away += max(-low, high) ** 2
             to[i, 2] = max(to[i, 2], math.sqrt(away))
