@@ -92,12 +92,19 @@ def folded(part: Part) -> Bool[np.ndarray, "F 3"]:
     """Return the sides of faces beyond which no neighbour's slab bounds what reaches over them."""
     mesh = part.topology
     rim = (mesh.edge_class == connectivity.BOUNDARY) | (mesh.edge_class == connectivity.IRREGULAR)
-    return (rim | (edge_cosines(part.points, mesh) < FOLD))[mesh.face_edges]
+    # Creases are edges between two faces there.
+    turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
+    return (rim | turned)[mesh.face_edges]
 
 
 def distances(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
     """Return how far patches can be from their triangles."""
     return np.maximum(np.maximum(-slabs[:, LOW], slabs[:, HIGH]), slabs[:, SIDE])
+
+
+def widths(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
+    """Return how far patches are at most from triangles in their slabs, sides aside."""
+    return slabs[:, HIGH] - slabs[:, LOW]
 
 
 def cut_distances(
@@ -114,7 +121,7 @@ def cut_distances(
     height = dot(middles - a, unit(cross(b - a, c - a)))
     low, high = slabs[:, LOW], slabs[:, HIGH]
     known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
-    sizes = np.where(np.isnan(height), high - low, known)
+    sizes = np.where(np.isnan(height), widths(slabs), known)
     return np.maximum(sizes, 2 * slabs[:, SIDE])
 
 
