@@ -102,11 +102,6 @@ def distances(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
     return np.maximum(np.maximum(-slabs[:, LOW], slabs[:, HIGH]), slabs[:, SIDE])
 
 
-def widths(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
-    """Return how far patches are at most from triangles in their slabs, sides aside."""
-    return slabs[:, HIGH] - slabs[:, LOW]
-
-
 def cut_distances(
     slabs: Float[np.ndarray, "N 3"],
     triangles: Float[np.ndarray, "N 3 3"],
@@ -121,7 +116,7 @@ def cut_distances(
     height = dot(middles - a, unit(cross(b - a, c - a)))
     low, high = slabs[:, LOW], slabs[:, HIGH]
     known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
-    sizes = np.where(np.isnan(height), widths(slabs), known)
+    sizes = np.where(np.isnan(height), high - low, known)
     return np.maximum(sizes, 2 * slabs[:, SIDE])
 
 

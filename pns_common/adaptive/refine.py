@@ -13,16 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.adaptive.certificate import distances, widths
-from pns_common.adaptive.parts import (
-    CHILD_WEIGHTS,
-    CHILDREN,
-    NOT_THERE,
-    Levels,
-    Part,
-    Refined,
-    Settled,
-)
+from pns_common.adaptive.certificate import distances
+from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part, Refined, Settled
 from pns_common.adaptive.tree import (
     DIGITS,
     Flags,
@@ -30,7 +22,6 @@ from pns_common.adaptive.tree import (
     Start,
     Tree,
     edges_of,
-    fanned,
     sides_of,
 )
 from pns_common.errors import MeshError, ParameterError
@@ -48,6 +39,19 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
+# The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
+# are 2 k + 1 and 2 k + 2.
+HALVES = 0.5 * np.array(
+    [
+        [[2, 0, 0], [0, 2, 0], [0, 0, 2]],
+        [[2, 0, 0], [1, 1, 0], [0, 0, 2]],
+        [[1, 1, 0], [0, 2, 0], [0, 0, 2]],
+        [[0, 2, 0], [0, 1, 1], [2, 0, 0]],
+        [[0, 1, 1], [0, 0, 2], [2, 0, 0]],
+        [[0, 0, 2], [1, 0, 1], [0, 2, 0]],
+        [[1, 0, 1], [2, 0, 0], [0, 2, 0]],
+    ]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +136,8 @@ class AdaptiveRefinement(Refinement):
     """A refinement with faces of several levels.
 
     Attributes:
-        codes: (F,) number of each face, or of that of which it is a piece, in its level.
-        sides, spans: (F,), (F, 2) the side at which that is cut, and between which of its points,
-            from 0 to 1, a face is; 0, 0 and 1 if it is not cut.
+        codes: (F,) number of each face, or of that of which it is a half, in its level.
+        halves: (F,) which half, as of ``HALVES``; 0: none.
         face_levels: (F,) how often each face's parent was split.
         distances: (F,) no point of the part of the limit surface that a face stands for is farther
             from its plane, in the mesh's units; at sharp edges none from the edge.
@@ -144,8 +147,7 @@ class AdaptiveRefinement(Refinement):
     """
 
     codes: Integer[np.ndarray, " F"] = field(repr=False)
-    sides: Integer[np.ndarray, " F"] = field(repr=False)
-    spans: Float[np.ndarray, "F 2"] = field(repr=False)
+    halves: Integer[np.ndarray, " F"] = field(repr=False)
     face_levels: Integer[np.ndarray, " F"] = field(repr=False)
     distances: Float[np.ndarray, " F"] = field(repr=False)
     goal: Goal
@@ -163,9 +165,7 @@ class AdaptiveRefinement(Refinement):
 
         They are whole multiples of 2^-levels, and sum to 1.
         """
-        made, codes = np.eye(3)[(self.sides[:, None] + np.arange(3)) % 3], self.codes
-        a, b = made[:, :1].copy(), made[:, 1:2].copy()
-        made[:, :2] = a + self.spans[:, :, None] * (b - a)
+        made, codes = HALVES[self.halves], self.codes
         for level in range(int(self.face_levels.max(initial=0))):
             rows = np.flatnonzero(self.face_levels > level)
             made[rows] = made[rows] @ CHILD_WEIGHTS[(codes[rows] >> (2 * level)) % CHILDREN]
@@ -364,9 +364,9 @@ def _written(
     made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
     keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    names, sides, spans, distance, codes = (
+    names, halves, distance, codes = (
         np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("names", "sides", "spans", "distances", "codes")
+        for name in ("names", "halves", "distances", "codes")
     )
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
@@ -394,8 +394,7 @@ def _written(
         scheme=scheme,
         limit_shift=shift,
         codes=codes,
-        sides=sides,
-        spans=spans,
+        halves=halves,
         face_levels=depths,
         distances=distance,
         goal=goal,
@@ -406,48 +405,34 @@ def _written(
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Faces of one level: names of corners, where they are cut, distances, codes."""
+    """Faces of one level: names of corners, halves, distances, codes."""
 
     names: Integer[np.ndarray, "F 3"]
-    sides: Integer[np.ndarray, " F"]
-    spans: Float[np.ndarray, "F 2"]
+    halves: Integer[np.ndarray, " F"]
     distances: Float[np.ndarray, " F"]
     codes: Integer[np.ndarray, " F"]
 
 
 def _faces_of(tree: Tree, depth: int) -> _Faces:
-    """Return the faces of a level that are not split; those beside split ones are cut.
-
-    A cut at m of the side from a to b leaves (a, m, c) and (m, b, c), which may be cut again.
-    """
+    """Return the faces of a level that are not split; those beside split ones are cut in two."""
     layer = tree.layers[depth]
     mesh, part, hit = layer.part.topology, layer.part, edges_of(layer, layer.split)
     rows = np.flatnonzero(part.exists & ~layer.split)
     cut = np.flatnonzero(sides_of(mesh, hit, rows))
-    distance, sides = distances(layer.slabs[rows]), np.zeros(len(rows), dtype=np.int8)
+    codes, distance, names = part.codes[rows], distances(layer.slabs[rows]), mesh.faces[rows]
+    names, edges = part.names[names], mesh.face_edges[rows[cut]]
     distance[cut] = tree.cut_distances(depth, rows[cut], hit)
-    fans = cut[fanned(layer, hit, rows[cut])]
-    distance[fans] = widths(layer.slabs[rows[fans]])
-    sides[cut] = hit[mesh.face_edges[rows[cut]]].argmax(axis=1)
-    names = part.names[mesh.faces[rows[:, None], (sides[:, None] + np.arange(3)) % 3]]
-    spans, at = np.tile([0.0, 1.0], (len(rows), 1)), np.arange(len(rows))
-    codes, side = part.codes[rows], sides
-    for finer in tree.layers[depth:] if len(fans) else [layer]:
-        there = np.searchsorted(finer.part.codes, codes)
-        there = np.minimum(there, len(finer.part.codes) - 1)
-        edge = finer.part.topology.face_edges[there, side]
-        cut = (finer.part.codes[there] == codes) & edges_of(finer, finer.split)[edge]
-        counts = 1 + cut
-        one = (np.cumsum(counts) - counts)[cut]
-        middle, half = finer.middles[edge[cut]], spans[cut].mean(axis=1)
-        parent, before, after = CHILDREN * codes[cut], side[cut], (side[cut] + 1) % 3
-        names, spans, at = (np.repeat(of, counts, axis=0) for of in (names, spans, at))
-        names[one, 1], names[one + 1, 0] = middle, middle
-        spans[one, 1], spans[one + 1, 0] = half, half
-        # Half of side k is the first side of child k, the other half the last one of the next.
-        codes, side = np.full(len(at), NOT_THERE), np.zeros(len(at), dtype=np.int64)
-        codes[one], codes[one + 1], side[one + 1] = parent + before, parent + after, 2
-    return _Faces(names, sides[at], spans, distance[at], part.codes[rows[at]])
+    side, own = hit[edges].argmax(axis=1), np.arange(len(cut))
+    middle = layer.middles[edges[own, side]]
+    # From a corner a, before the side that is cut at m: (a, m, c) and (m, b, c).
+    a, b, c = (names[cut, (side + k) % 3] for k in range(3))
+    counts, halves = np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int8)
+    counts[cut] = 2
+    at, firsts = np.repeat(np.arange(len(rows)), counts), (np.cumsum(counts) - counts)[cut]
+    names, halves = names[at], halves[at]
+    names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
+    halves[firsts], halves[firsts + 1] = 2 * side + 1, 2 * side + 2
+    return _Faces(names, halves, distance[at], codes[at])
 
 
 # --- arguments ------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.adaptive.certificate import SIDE, cut_distances, distances, folded, slabs, widths
+from pns_common.adaptive.certificate import cut_distances, distances, folded, slabs
 from pns_common.adaptive.parts import (
     CHILDREN,
     NOT_THERE,
@@ -29,7 +29,6 @@ from pns_common.mesh.topology import Topology
 
 # Errors that agree in so many digits are equal.
 DIGITS = 9
-NO_FAN = -1
 Flags = Sequence[Bool[np.ndarray, " _"]]
 Codes = Sequence[Integer[np.ndarray, " _"]]
 
@@ -72,7 +71,6 @@ class Layer:
         part: the faces, and those around them.
         split: (F,) which faces are split.
         errors, slabs: (F,), (F, 3) of those that exist; 0 elsewhere.
-        fans: (F,) the side at which a face that is not split may be cut in many, or NO_FAN.
         middles: (E,) the name of the vertex on each edge at the next level, or NOT_THERE.
         step: from this level to the next; None at the last.
         settled: vertices that are in no level before.
@@ -82,7 +80,6 @@ class Layer:
     split: Bool[np.ndarray, " F"]
     errors: Float[np.ndarray, " F"]
     slabs: Float[np.ndarray, "F 3"]
-    fans: Integer[np.ndarray, " F"]
     middles: Integer[np.ndarray, " E"]
     step: Refined | None
     settled: Sequence[Settled]
@@ -144,8 +141,7 @@ class Tree:
                 sides = sides_of(mesh, hit, rows)
                 more = sides > 1
                 if widest is not None:
-                    cut = (sides == 1) & ~own[rows] & layer.part.exists[rows]
-                    cut = np.flatnonzero(cut & ~fanned(layer, hit, rows))
+                    cut = np.flatnonzero((sides == 1) & ~own[rows] & layer.part.exists[rows])
                     more[cut] = self.cut_distances(depth, rows[cut], hit) > widest
                 new = rows[more & ~own[rows]]
                 if len(new) == 0:
@@ -155,10 +151,8 @@ class Tree:
                 hit |= fresh
                 rows = np.flatnonzero(sides_of(mesh, fresh, every))
             if depth:
-                # A face is split or cut only where its parent is split, or cut in many.
-                sides = sides_of(mesh, hit, every)
-                asked = own | (sides > 1) | ((sides == 1) & ~fanned(layer, hit, every))
-                asked = layer.part.codes[asked] // CHILDREN
+                # Such a face exists, or is split or cut, only where its parent is split.
+                asked = layer.part.codes[own | (sides_of(mesh, hit, every) > 0)] // CHILDREN
                 above = self.layers[depth - 1].part.codes
                 made[depth - 1][np.searchsorted(above, asked)] = True
         return made
@@ -187,14 +181,6 @@ def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " 
     """Return which edges are sides of split faces."""
     mesh = layer.part.topology
     return marked(mesh.face_edges[split], len(mesh.edges))
-
-
-def fanned(
-    layer: Layer, hit: Bool[np.ndarray, " E"], rows: Integer[np.ndarray, " N"]
-) -> Bool[np.ndarray, " N"]:
-    """Return which faces may be cut in many at a flagged edge."""
-    edges = layer.part.topology.face_edges[rows, np.maximum(layer.fans[rows], 0)]
-    return (layer.fans[rows] != NO_FAN) & hit[edges]
 
 
 def sides_of(
@@ -254,7 +240,6 @@ class Start:
                 settled = self._settle(part, places)
             old = known[depth] if depth < len(known) else None
             errors, slabs = self._measured(part, places, finer, old)
-            fans = self._fans(part, errors, slabs, places, layers[-1] if layers else None)
             split = part.exists & (errors > threshold) & (not only)
             if forced is not None and depth < len(forced):
                 split |= part.exists & np.isin(part.codes, forced[depth])
@@ -266,7 +251,7 @@ class Start:
                     finer, step, middles = self.levels.split(part, split, names)
                     places = _longer(places, len(step.topology.edges))
                 names = len(places)
-            layers.append(Layer(part, split, errors, slabs, fans, middles, step, settled))
+            layers.append(Layer(part, split, errors, slabs, middles, step, settled))
             if finer is None or not split.any():
                 break
             part = finer
@@ -284,42 +269,6 @@ class Start:
         for own in made:
             places[own.names] = own.limits
         return made
-
-    def _fans(
-        self,
-        part: Part,
-        errors: Float[np.ndarray, " F"],
-        slabs: Float[np.ndarray, "F 3"],
-        places: Float[np.ndarray, "N 3"],
-        above: Layer | None,
-    ) -> Integer[np.ndarray, " F"]:
-        """Return the sides at which faces may be cut in many, and lower the errors of these.
-
-        Such a face is flat and has one folded side, and that beyond is not flat. Their curve is an
-        error of the latter alone. Parts of such a face that do not exist have its side.
-        """
-        mesh, tolerance = part.topology, self.goal.tolerance
-        fans = np.full(mesh.face_count, NO_FAN, dtype=np.int8)
-        if tolerance is None or self.goal.max_faces is not None:
-            return fans
-        flat = part.exists & (widths(slabs) <= tolerance)
-        rows = np.flatnonzero(flat & (slabs[:, SIDE] > 0))
-        sides = folded(part)[rows]
-        side = sides.argmax(axis=1)
-        pair = mesh.half_edges[mesh.face_edges[rows, side]] // 3
-        beyond = np.where(pair[:, 0] == rows, pair[:, 1], pair[:, 0])
-        one = (sides.sum(axis=1) == 1) & (beyond >= 0) & part.exists[beyond] & ~flat[beyond]
-        rows = rows[one]
-        fans[rows] = side[one]
-        errors[rows] = self.goal.errors(widths(slabs[rows]), places[part.names[mesh.faces[rows]]])
-        if above is not None:
-            rows = np.flatnonzero(~part.exists)
-            parents = np.searchsorted(above.part.codes, part.codes[rows] // CHILDREN)
-            child, side = part.codes[rows] % CHILDREN, above.fans[parents]
-            # Child k begins at corner k: its first side is half of side k, its last of that before.
-            own = np.where(child == (side + 1) % 3, 2, np.where(child == side, 0, NO_FAN))
-            fans[rows] = np.where(side == NO_FAN, NO_FAN, own)
-        return fans
 
     def _measured(
         self,
