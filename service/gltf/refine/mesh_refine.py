@@ -17,16 +17,18 @@ from pns_common.mesh.topology import Topology, split_faces
 from pns_common.operator.scheme import Scheme
 from pns_common.operator.sharpness import creases_by_name
 from pns_common.parallel import Blocks, available_threads
-from pns_common.refinement import Refinement, refine, refine_many
+from pns_common.refined import Refinement
+from pns_common.refinement import refine, refine_many
 from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...course import Course
 from ...errors import UnrefinableError
 from ...options import Options
-from .columns import SkinAndMorph, refined_skin_and_morph
+from .columns import refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
+from .skin import SkinAndMorph
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
