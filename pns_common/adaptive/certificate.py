@@ -9,15 +9,16 @@ they promise.
 from __future__ import annotations
 
 from functools import cache
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.adaptive.parts import CHILDREN, Levels, Part
+from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part
 from pns_common.kernels import connectivity
 from pns_common.kernels import flatness as kernels
 from pns_common.mesh.creases import edge_cosines
-from pns_common.mesh.rows import marked
+from pns_common.mesh.rows import cross, dot, marked, unit
 from pns_common.schemes.loop_weights import beta
 
 # The side of a face that each side of its children is half of, from (a, ab, ca) on, or NO_SIDE.
@@ -49,7 +50,7 @@ def slabs(
         enough: slabs that are smaller need not be exact; 0: all need.
     """
     count, each = len(faces), CHILDREN**deeper
-    of_face = sides_of_descendants(deeper)
+    of_face = OF_CHILDREN if deeper else np.array([[0, 1, 2]])
     asked = np.hstack([sides, np.zeros((count, 1), dtype=bool)])[:, of_face]
     compared = np.ascontiguousarray(np.where(asked, of_face, -1).reshape(-1, 3), dtype=np.int32)
     about = triangles.repeat(each, axis=0)
@@ -61,19 +62,39 @@ def slabs(
 
 
 @cache
-def sides_of_descendants(deeper: int) -> Integer[np.ndarray, "D 3"]:
-    """Return the side of a face that each side of its descendants is a piece of, or NO_SIDE."""
-    made = np.array([[0, 1, 2]])
-    for _ in range(deeper):
-        made = np.hstack([made, np.full((len(made), 1), NO_SIDE)])[:, OF_CHILDREN].reshape(-1, 3)
-    return made
+def net_of_quartics() -> Float[np.ndarray, "12 N"]:
+    """Return the weights of a regular patch's control points in Bernstein ordinates of its pieces.
+
+    The patch is a quartic, and so is each quarter of it. Points are those of ``measure_faces``.
+    """
+    blossom = np.zeros((3, 3, 3, 3, 12))
+    for c in range(3):
+        n, p = (c + 1) % 3, (c + 2) % 3
+        star = [4 * c, 4 * n, 4 * p, 4 * c + 1, 4 * c + 2, 4 * c + 3, 4 * n + 1]
+        for at, weights in (
+            ((c, c, c, c), (12, 2, 2, 2, 2, 2, 2)),
+            ((c, c, c, n), (12, 4, 3, 1, 0, 1, 3)),
+            ((c, c, c, p), (12, 3, 4, 3, 1, 0, 1)),
+            ((c, c, n, n), (8, 8, 4, 0, 0, 0, 4)),
+            ((c, c, n, p), (10, 6, 6, 1, 0, 0, 1)),
+        ):
+            for order in permutations(at):
+                blossom[order][star] = np.array(weights) / 24
+    made = list[np.ndarray]()
+    for child in CHILD_WEIGHTS:
+        own = np.einsum("abcdx,ia,jb,kc,ld->ijklx", blossom, child, child, child, child)
+        made.extend(own[at] for at in combinations_with_replacement(range(3), 4))
+    # Whole multiples of 1 / (24 · 16): pieces meet in ordinates that are equal.
+    return np.ascontiguousarray(np.unique(np.rint(384 * np.array(made)), axis=0).T) / 384
 
 
 def folded(part: Part) -> Bool[np.ndarray, "F 3"]:
     """Return the sides of faces beyond which no neighbour's slab bounds what reaches over them."""
     mesh = part.topology
     rim = (mesh.edge_class == connectivity.BOUNDARY) | (mesh.edge_class == connectivity.IRREGULAR)
-    return (rim | (edge_cosines(part.points, mesh) < FOLD))[mesh.face_edges]
+    # Creases are edges between two faces there.
+    turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
+    return (rim | turned)[mesh.face_edges]
 
 
 def distances(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
@@ -91,10 +112,8 @@ def cut_distances(
     The cut raises a triangle by 0 to the point's height. Where that is not known (NaN) it lies in
     the slab, so both are apart by no more than the slab is wide.
     """
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(lengths > 0, lengths, 1.0)
-    height = np.einsum("ij,ij->i", middles - triangles[:, 0], normals)
+    a, b, c = (triangles[:, k] for k in range(3))
+    height = dot(middles - a, unit(cross(b - a, c - a)))
     low, high = slabs[:, LOW], slabs[:, HIGH]
     known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
     sizes = np.where(np.isnan(height), high - low, known)
@@ -120,14 +139,16 @@ def _measured(
         rules = np.ascontiguousarray(mesh.sharpest.weights[:, 1:])
     made, points = np.empty((len(faces), 4)), part.points
     read = points, mesh.corners, mesh.corner_edges, mesh.half_edges, mesh.edge_class
-    rings = mesh.sharpness, mesh.valence, rules, beta(np.arange(kernels.MOST + 1))
+    net = net_of_quartics()
+    rings = mesh.sharpness, mesh.valence, rules, beta(np.arange(kernels.MOST + 1)), net
     asked = faces, np.ascontiguousarray(triangles).reshape(-1, 3), compared, enough, steps
 
     def work(begin: int, end: int) -> None:
         rows = kernels.DEEPEST + 1
-        numbers = np.zeros((9 * rows, kernels.WIDTH))
+        numbers = np.zeros((9 * rows + 3, kernels.WIDTH))
         whole = np.zeros((8 + 3 * rows, kernels.WIDTH), dtype=np.int64)
-        kernels.measure_faces(*read, *rings, *asked, begin, end, numbers, whole, made)
+        ordinates = np.zeros(net.shape[1])
+        kernels.measure_faces(*read, *rings, *asked, begin, end, numbers, ordinates, whole, made)
 
     levels.blocks.quiet().run(len(faces), work)
     # Where fans of several kinds meet, or of very many faces.

@@ -23,6 +23,15 @@ from pns_common.schemes.limit import limit_positions
 
 NOT_THERE = -1
 CHILDREN = 4
+# The weights of a face's corners at the corners of its children.
+CHILD_WEIGHTS = 0.5 * np.array(
+    [
+        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
+        [[0, 2, 0], [0, 1, 1], [1, 1, 0]],
+        [[0, 0, 2], [1, 0, 1], [0, 1, 1]],
+        [[1, 1, 0], [0, 1, 1], [1, 0, 1]],
+    ]
+)
 
 
 @dataclass(frozen=True, eq=False)

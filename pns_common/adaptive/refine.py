@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.adaptive.certificate import distances
-from pns_common.adaptive.parts import CHILDREN, Levels, Part, Refined, Settled
+from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part, Refined, Settled
 from pns_common.adaptive.tree import (
     DIGITS,
     Flags,
@@ -22,7 +22,7 @@ from pns_common.adaptive.tree import (
     Start,
     Tree,
     edges_of,
-    sides_split,
+    sides_of,
 )
 from pns_common.errors import MeshError, ParameterError
 from pns_common.mesh.creases import Creases
@@ -39,8 +39,19 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
-# The corners of a face's children, as halves of sums of two of its own.
-CHILD_CORNERS = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 5]])
+# The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
+# are 2 k + 1 and 2 k + 2.
+HALVES = 0.5 * np.array(
+    [
+        [[2, 0, 0], [0, 2, 0], [0, 0, 2]],
+        [[2, 0, 0], [1, 1, 0], [0, 0, 2]],
+        [[1, 1, 0], [0, 2, 0], [0, 0, 2]],
+        [[0, 2, 0], [0, 1, 1], [2, 0, 0]],
+        [[0, 1, 1], [0, 0, 2], [2, 0, 0]],
+        [[0, 0, 2], [1, 0, 1], [0, 2, 0]],
+        [[1, 0, 1], [2, 0, 0], [0, 2, 0]],
+    ]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +146,8 @@ class AdaptiveRefinement(Refinement):
     """A refinement with faces of several levels.
 
     Attributes:
-        face_parents: (F,) the control face that each face is a part of.
-        weights: (F, 3, 3) weights of that face's corners at each corner of a face: whole multiples
-            of 2^-levels that sum to 1.
+        codes: (F,) number of each face, or of that of which it is a half, in its level.
+        halves: (F,) which half, as of ``HALVES``; 0: none.
         face_levels: (F,) how often each face's parent was split.
         distances: (F,) no point of the part of the limit surface that a face stands for is farther
             from its plane, in the mesh's units; at sharp edges none from the edge.
@@ -146,13 +156,30 @@ class AdaptiveRefinement(Refinement):
         control: the control mesh with its sharp edges.
     """
 
-    face_parents: Integer[np.ndarray, " F"] = field(repr=False)
-    weights: Float[np.ndarray, "F 3 3"] = field(repr=False)
+    codes: Integer[np.ndarray, " F"] = field(repr=False)
+    halves: Integer[np.ndarray, " F"] = field(repr=False)
     face_levels: Integer[np.ndarray, " F"] = field(repr=False)
     distances: Float[np.ndarray, " F"] = field(repr=False)
     goal: Goal
     trail: Trail = field(repr=False)
     control: Level = field(repr=False)
+
+    @cached_property
+    def face_parents(self) -> Integer[np.ndarray, " F"]:
+        """The control face that each face is a part of."""
+        return self.codes >> (2 * self.face_levels)
+
+    @cached_property
+    def weights(self) -> Float[np.ndarray, "F 3 3"]:
+        """Weights of the control face's corners at each corner of a face.
+
+        They are whole multiples of 2^-levels, and sum to 1.
+        """
+        made, codes = HALVES[self.halves], self.codes
+        for level in range(int(self.face_levels.max(initial=0))):
+            rows = np.flatnonzero(self.face_levels > level)
+            made[rows] = made[rows] @ CHILD_WEIGHTS[(codes[rows] >> (2 * level)) % CHILDREN]
+        return made
 
     @cached_property
     def normals(self) -> Float[np.ndarray, "V 3"]:
@@ -254,7 +281,9 @@ def _near_enough(start: Start) -> Tree:
         closed = tree.closed(tree.split, start.goal.tolerance)
         if _same(tree.split, closed):
             return tree
-        tree = start.grow(1.0, tree.codes(closed), known=tree)
+        forced, known = tree.codes(closed), tree.measured
+        del tree, closed
+        tree = start.grow(1.0, forced, known=known)
 
 
 def _with_so_many(start: Start) -> Tree:
@@ -268,15 +297,26 @@ def _with_so_many(start: Start) -> Tree:
         if made > most or left <= least:
             break
         threshold = max(min(threshold * max(SMALLER, made / most), left * BELOW), least)
-        tree = start.grow(threshold, known=tree)
-    order = _worst_first(tree)
-    low, high = 0, len(order) + 1
+        known = tree.measured
+        del tree
+        tree = start.grow(threshold, known=known)
+    order, turn = _worst_first(tree), 0
+    low, fewer = 0, tree.layers[0].part.topology.face_count
+    high, more = len(order), made
+    if made <= most:
+        low = high
     while high - low > 1:
-        middle = (low + high) // 2
-        fits = tree.count(tree.closed(_flagged(tree, order[:middle]))) <= most
-        low, high = (middle, high) if fits else (low, middle)
-    split = tree.closed(_flagged(tree, order[:low]))
-    return start.grow(threshold, tree.codes(split), only=True, known=tree)
+        # Faces are nearly proportional to splits; each third time the middle, so that it ends.
+        turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
+        middle = min(max(low + int(share * (high - low)), low + 1), high - 1)
+        made = tree.count(tree.closed(_flagged(tree, order[:middle])))
+        if made <= most:
+            low, fewer = middle, made
+        else:
+            high, more = middle, made
+    forced, known = tree.codes(tree.closed(_flagged(tree, order[:low]))), tree.measured
+    del tree
+    return start.grow(threshold, forced, only=True, known=known)
 
 
 def _largest_left(tree: Tree, deepest: int) -> float:
@@ -339,9 +379,9 @@ def _written(
     made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
     keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    names, weights, distance, codes = (
+    names, halves, distance, codes = (
         np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("names", "weights", "distances", "codes")
+        for name in ("names", "halves", "distances", "codes")
     )
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
@@ -363,8 +403,8 @@ def _written(
         steps=[] if first is None else [first],
         scheme=scheme,
         surface=None,
-        face_parents=codes >> (2 * depths),
-        weights=weights,
+        codes=codes,
+        halves=halves,
         face_levels=depths,
         distances=distance,
         goal=goal,
@@ -375,10 +415,10 @@ def _written(
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Faces of one level: names of corners, weights, distances, codes."""
+    """Faces of one level: names of corners, halves, distances, codes."""
 
     names: Integer[np.ndarray, "F 3"]
-    weights: Float[np.ndarray, "F 3 3"]
+    halves: Integer[np.ndarray, " F"]
     distances: Float[np.ndarray, " F"]
     codes: Integer[np.ndarray, " F"]
 
@@ -386,39 +426,23 @@ class _Faces:
 def _faces_of(tree: Tree, depth: int) -> _Faces:
     """Return the faces of a level that are not split; those beside split ones are cut in two."""
     layer = tree.layers[depth]
-    mesh, part = layer.part.topology, layer.part
+    mesh, part, hit = layer.part.topology, layer.part, edges_of(layer, layer.split)
     rows = np.flatnonzero(part.exists & ~layer.split)
-    cut = sides_split(layer, layer.split)[rows] > 0
-    codes, distance = part.codes[rows], distances(layer.slabs[rows])
-    distance[cut] = tree.cut_distances(depth, rows[cut], edges_of(layer, layer.split))
-    names, weights = part.names[mesh.faces[rows]], _weights(codes, depth)
-    divided = edges_of(layer, layer.split)[mesh.face_edges[rows[cut]]]
+    cut = np.flatnonzero(sides_of(mesh, hit, rows))
+    codes, distance, names = part.codes[rows], distances(layer.slabs[rows]), mesh.faces[rows]
+    names, edges = part.names[names], mesh.face_edges[rows[cut]]
+    distance[cut] = tree.cut_distances(depth, rows[cut], hit)
+    side, own = hit[edges].argmax(axis=1), np.arange(len(cut))
+    middle = layer.middles[edges[own, side]]
     # From a corner a, before the side that is cut at m: (a, m, c) and (m, b, c).
-    turn = (divided.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    own = np.arange(len(turn))
-    middle = layer.middles[mesh.face_edges[rows[cut]][own, turn[:, 0]]]
-    a, b, c = names[cut][own[:, None], turn].T
-    wa, wb, wc = (weights[cut][own, turn[:, k]] for k in range(3))
-    between = (wa + wb) / 2
-    counts = np.where(cut, 2, 1)
-    at = np.repeat(np.arange(len(rows)), counts)
-    firsts = (np.cumsum(counts) - counts)[cut]
-    names, weights = names[at], weights[at]
+    a, b, c = (names[cut, (side + k) % 3] for k in range(3))
+    counts, halves = np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int8)
+    counts[cut] = 2
+    at, firsts = np.repeat(np.arange(len(rows)), counts), (np.cumsum(counts) - counts)[cut]
+    names, halves = names[at], halves[at]
     names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
-    weights[firsts] = np.stack([wa, between, wc], axis=1)
-    weights[firsts + 1] = np.stack([between, wb, wc], axis=1)
-    return _Faces(names, weights, distance[at], codes[at])
-
-
-def _weights(codes: Integer[np.ndarray, " F"], depth: int) -> Float[np.ndarray, "F 3 3"]:
-    """Return the weights of control faces' corners at the corners of faces of a level."""
-    made = np.tile(np.eye(3), (len(codes), 1, 1))
-    for level in reversed(range(depth)):
-        child = (codes >> (2 * level)) % CHILDREN
-        middles = (made + np.roll(made, -1, axis=1)) / 2
-        points = np.concatenate([made, middles], axis=1)
-        made = np.take_along_axis(points, CHILD_CORNERS[child][:, :, None], axis=1)
-    return made
+    halves[firsts], halves[firsts + 1] = 2 * side + 1, 2 * side + 2
+    return _Faces(names, halves, distance[at], codes[at])
 
 
 # --- arguments ------------------------------------------------------------------------------------

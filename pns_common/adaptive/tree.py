@@ -23,7 +23,9 @@ from pns_common.adaptive.parts import (
     Refined,
     Settled,
 )
+from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
+from pns_common.mesh.topology import Topology
 
 # Errors that agree in so many digits are equal.
 DIGITS = 9
@@ -84,6 +86,15 @@ class Layer:
 
 
 @dataclass(frozen=True, eq=False)
+class Measured:
+    """Faces of a level that exist: their codes, errors and slabs."""
+
+    codes: Integer[np.ndarray, " N"]
+    errors: Float[np.ndarray, " N"]
+    slabs: Float[np.ndarray, "N 3"]
+
+
+@dataclass(frozen=True, eq=False)
 class Tree:
     """Faces of all levels.
 
@@ -104,6 +115,15 @@ class Tree:
         """Return the codes of flagged faces."""
         return [at.part.codes[own] for at, own in zip(self.layers, split, strict=True)]
 
+    @property
+    def measured(self) -> Sequence[Measured]:
+        """Measurements of faces, level by level: they take less memory than the tree."""
+        return [
+            Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own])
+            for layer in self.layers
+            for own in [layer.part.exists]
+        ]
+
     def closed(self, split: Flags, widest: float | None = None) -> Flags:
         """Return the faces to split, so that the others can be cut to meet them.
 
@@ -115,10 +135,10 @@ class Tree:
         made = [own.copy() for own in split]
         for depth in reversed(range(len(made))):
             layer, own = self.layers[depth], made[depth]
-            edges, hit = layer.part.topology.face_edges, edges_of(layer, own)
-            rows = np.arange(len(own))
+            mesh, hit, every = layer.part.topology, edges_of(layer, own), np.arange(len(own))
+            rows, edges = every, mesh.face_edges
             while True:
-                sides = _sum(hit, edges[rows])
+                sides = sides_of(mesh, hit, rows)
                 more = sides > 1
                 if widest is not None:
                     cut = np.flatnonzero((sides == 1) & ~own[rows] & layer.part.exists[rows])
@@ -129,10 +149,10 @@ class Tree:
                 own[new] = True
                 fresh = marked(edges[new], len(hit)) & ~hit
                 hit |= fresh
-                rows = np.flatnonzero(_sum(fresh, edges))
+                rows = np.flatnonzero(sides_of(mesh, fresh, every))
             if depth:
                 # Such a face exists, or is split or cut, only where its parent is split.
-                asked = layer.part.codes[own | (_sum(hit, edges) > 0)] // CHILDREN
+                asked = layer.part.codes[own | (sides_of(mesh, hit, every) > 0)] // CHILDREN
                 above = self.layers[depth - 1].part.codes
                 made[depth - 1][np.searchsorted(above, asked)] = True
         return made
@@ -150,12 +170,11 @@ class Tree:
 
     def count(self, split: Flags) -> int:
         """Return how many faces are written, of flags that are ``closed``."""
-        cut = sum(
-            int((~own & (sides_split(layer, own) > 0)).sum())
-            for layer, own in zip(self.layers, split, strict=True)
-        )
-        divided = sum(int(own.sum()) for own in split)
-        return self.layers[0].part.topology.face_count + (CHILDREN - 1) * divided + cut
+        written = self.layers[0].part.topology.face_count
+        for layer, own in zip(self.layers, split, strict=True):
+            cut = sides_of(layer.part.topology, edges_of(layer, own), np.flatnonzero(~own))
+            written += (CHILDREN - 1) * np.count_nonzero(own) + np.count_nonzero(cut)
+        return int(written)
 
 
 def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " E"]:
@@ -164,17 +183,13 @@ def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " 
     return marked(mesh.face_edges[split], len(mesh.edges))
 
 
-def sides_split(layer: Layer, split: Bool[np.ndarray, " F"]) -> Integer[np.ndarray, " F"]:
-    """Return how many sides of each face are those of split faces."""
-    return _sum(edges_of(layer, split), layer.part.topology.face_edges)
-
-
-def _sum(
-    flags: Bool[np.ndarray, " E"], edges: Integer[np.ndarray, "F 3"]
-) -> Integer[np.ndarray, " F"]:
-    """Return how many edges of each face are flagged."""
-    a, b, c = (flags[edges[:, k]].view(np.int8) for k in range(3))
-    return a + b + c
+def sides_of(
+    mesh: Topology, flags: Bool[np.ndarray, " E"], rows: Integer[np.ndarray, " N"]
+) -> Integer[np.ndarray, " N"]:
+    """Return how many sides of some faces are flagged edges."""
+    made = np.empty(len(rows), dtype=np.int8)
+    kernels.count_sides(mesh.corner_edges, flags, rows, made)
+    return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +216,7 @@ class Start:
         forced: Codes | None = None,
         *,
         only: bool = False,
-        known: Tree | None = None,
+        known: Sequence[Measured] = (),
     ) -> Tree:
         """Split the faces whose error is above a threshold, and those that are forced.
 
@@ -209,7 +224,7 @@ class Start:
             threshold: of errors.
             forced: codes of faces that are split in any case, level by level.
             only: split no others.
-            known: a tree of the same start, whose faces need not be measured again.
+            known: faces that need not be measured again, level by level.
         """
         part, names = self.control, len(self.control.points)
         places, layers = np.full((names, 3), np.nan), list[Layer]()
@@ -223,7 +238,7 @@ class Start:
                 settled = self._settle(finer, places)
             else:
                 settled = self._settle(part, places)
-            old = known.layers[depth] if known is not None and depth < len(known.layers) else None
+            old = known[depth] if depth < len(known) else None
             errors, slabs = self._measured(part, places, finer, old)
             split = part.exists & (errors > threshold) & (not only)
             if forced is not None and depth < len(forced):
@@ -260,21 +275,21 @@ class Start:
         part: Part,
         places: Float[np.ndarray, "N 3"],
         finer: Part | None,
-        known: Layer | None,
+        known: Measured | None,
     ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
         """Return errors and slabs of faces that exist, of those of the next level if it is given.
 
-        Those that are known are taken from a layer of another tree.
+        Those that are known are not measured again.
         """
         count = part.topology.face_count
         errors, made, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
-        if known is not None:
-            codes = known.part.codes
-            there = np.minimum(np.searchsorted(codes, part.codes[rows]), len(codes) - 1)
-            same = (codes[there] == part.codes[rows]) & known.part.exists[there]
+        if known is not None and len(known.codes):
+            codes = part.codes[rows]
+            there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
+            same = known.codes[there] == codes
             errors[rows[same]], made[rows[same]] = (
-                known.errors[there[same]],
-                known.slabs[there[same]],
+                known.errors[there][same],
+                known.slabs[there][same],
             )
             rows = rows[~same]
         if len(rows):

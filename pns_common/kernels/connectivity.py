@@ -470,3 +470,13 @@ def pair_up(first: i8_1d, second: i8_1d, free: b1_1d, chosen: b1_1d):
         if free[first[n]] and free[second[n]]:
             free[first[n]] = free[second[n]] = False
             chosen[n] = True
+
+
+@kernel
+def count_sides(corner_edges: u4_1d, flags: b1_1d, rows: i8_1d, to: i1_1d):
+    """Count the flagged sides of some triangles."""
+    for i in range(len(rows)):
+        h = 3 * rows[i]
+        to[i] = flags[corner_edges[h]]
+        to[i] += flags[corner_edges[h + 1]]
+        to[i] += flags[corner_edges[h + 2]]

@@ -9,8 +9,10 @@ those three, o at others on this side, and b beyond is at most
 
 and the like from below. On a sharp curve both ends have two thirds of the weight.
 
-Where that is too much, values of the function are refined around the face, and its four children
-are bounded, up to ``DEEPEST`` times. A face is three stars: a corner with its neighbours,
+Patches of regular faces are quartics, and lie between their Bernstein ordinates.
+
+Where neither is near enough, values of the function are refined around the face, and its four
+children are bounded, up to ``DEEPEST`` times. A face is three stars: a corner with its neighbours,
 anticlockwise from the next corner on. All that is refined of a star follows from the star.
 """
 
@@ -60,10 +62,13 @@ OF_ENDS, OF_CORNERS = 2 / 3, 1 / 2
 HALF = 1 / 2
 # All but the curve's own rule has so much weight on a curve at most, in units of 1 − w.
 OF_RING = 1.65
+# Regular patches: their corners' neighbours, and the largest sharpness of edges to these.
+REGULAR, SOFTEST = 6, 1 / 2
 # What control points of children reach is a little more than what the patch reaches: at least so
 # much, mostly. Bounds are near enough at NEAR times it, or BELOW it where that decides. Faces whose
-# own control points reach FAR times what is enough are to be split.
-LEAST, BELOW, NEAR, FAR = 0.85, 0.9, 1.05, 3.0
+# own control points reach FAR times what is enough are to be split. Patches reach at least TIGHT
+# times what the ordinates of regular ones do. LITTLE: softness moves these by little.
+LEAST, BELOW, NEAR, FAR, TIGHT, LITTLE = 0.85, 0.9, 1.05, 3.0, 0.93, 1 / 16
 
 
 @inlined
@@ -135,11 +140,17 @@ def find_star(corners, corner_edges, half_edges, edge_class, h, around, edges):
 
 
 @inlined
+def wrapped(i, count):
+    """Return i modulo a count that it is less than twice (a division takes longer than a star)."""
+    return i if i < count else i - count
+
+
+@inlined
 def curve_of(w, shape, r):
     """Return which two neighbours are on the curve through a star's centre."""
     k, gap = shape[r, DEGREE], shape[r, GAP]
     if gap >= 0:
-        return gap, (gap + 1) % k
+        return gap, wrapped(gap + 1, k)
     one, two = 0, 1
     if w[r, 1] > w[r, 0]:
         one, two = 1, 0
@@ -160,7 +171,7 @@ def refine_star(z, w, shape, beta, r, to):
         n = z[r, i]
         total += n
         middle = MIDPOINT * (p + n)
-        if gap >= 0 and (i == gap or i == (gap + 1) % k):
+        if gap >= 0 and (i == gap or i == wrapped(gap + 1, k)):
             to[r, i] = middle
             continue
         sides = z[r, i - 1 if i > 0 else k - 1] + z[r, i + 1 if i + 1 < k else 0]
@@ -196,18 +207,82 @@ def middle_star(placed, w, shape, x, y, turn, z, to):
     many = 4 if border else 6
     for i in range(many):
         w[to, i] = 0.0
-    own, other = (turn + 1) % many, (turn + many - 2) % many
+    own, other = wrapped(turn + 1, many), wrapped(turn + many - 2, many)
     z[to, turn], z[to, own] = placed[x, 1], placed[x, CENTRE]
-    z[to, other], z[to, (other + 1) % many] = placed[y, CENTRE], placed[y, 0]
+    z[to, other], z[to, wrapped(other + 1, many)] = placed[y, CENTRE], placed[y, 0]
     w[to, own], w[to, other] = sharp, sharp
     if not border:
-        z[to, (turn + 2) % many] = placed[x, k - 1]
-        z[to, (turn + 3) % many] = placed[y, 2 % shape[y, DEGREE]]
+        z[to, wrapped(turn + 2, many)] = placed[x, k - 1]
+        z[to, wrapped(turn + 3, many)] = placed[y, wrapped(2, shape[y, DEGREE])]
     z[to, CENTRE], w[to, SECOND], w[to, THIRD] = placed[x, 0], sharp, 0.0
     shape[to, DEGREE], shape[to, GAP] = many, own if border else -1
 
 
 # --- bounds ---------------------------------------------------------------------------------------
+
+
+@inlined
+def regular_star(z, w, shape, c, to, k):
+    """Write a star of six neighbours for one whose patches are the same by smooth rules alone.
+
+    What lies beyond a curve is such that the smooth rules give the curve's. Return the largest
+    sharpness of other edges; 1 if there is no such star.
+    """
+    many, gap, curve, most = shape[c, DEGREE], shape[c, GAP], -1, 0.0
+    if w[c, THIRD] > 0 or many != (REGULAR if gap < 0 else REGULAR - 2):
+        return 1.0
+    if w[c, SECOND] >= 1:
+        # The spoke of the curve before what lies beyond, which the face does not.
+        curve = gap if gap >= 0 else 0
+        while gap < 0 and curve < 3 and (w[c, curve] < 1 or w[c, curve + 3] < 1):
+            curve += 1
+        if gap < 0 and curve == 3:
+            return 1.0
+        curve = 3 if curve == 0 else curve
+    elif gap >= 0:
+        return 1.0
+    straight = curve >= 0 or w[c, SECOND] == 0
+    for i in range(many):
+        j = i + 2 if gap >= 0 and i > gap else i
+        to[k, j] = z[c, i]
+        if curve < 0:
+            straight = straight or (w[c, i] > 0 and w[c, wrapped(i + 3, REGULAR)] > 0)
+        if curve < 0 or not (curve <= j <= curve + 3 or j == curve - 3):
+            most = max(most, w[c, i])
+    if curve >= 0:
+        far = wrapped(curve + 3, REGULAR)
+        to[k, curve + 1] = z[c, CENTRE] + to[k, curve] - to[k, curve - 1]
+        to[k, curve + 2] = z[c, CENTRE] + to[k, far] - to[k, wrapped(far + 1, REGULAR)]
+    to[k, REGULAR] = z[c, CENTRE]
+    return most if straight else 1.0
+
+
+@inlined
+def regular_bounds(stars, softness, net, ordinates):
+    """Return bounds on the patch of a regular face, of the ordinates of its four quartics.
+
+    Return also how much of them softness may have moved.
+    """
+    for j in range(len(ordinates)):
+        ordinates[j] = 0.0
+    for k in range(3):
+        for i in range(4):
+            value = stars[k, REGULAR if i == 0 else i + 1]
+            for j in range(len(ordinates)):
+                ordinates[j] += value * net[4 * k + i, j]
+    low, high = ordinates[0], ordinates[0]
+    for j in range(1, len(ordinates)):
+        low, high = min(low, ordinates[j]), max(high, ordinates[j])
+    bend = 0.0
+    if softness > 0:
+        for k in range(3):
+            before, here = stars[k, REGULAR - 1], stars[k, 0]
+            for i in range(REGULAR):
+                after = stars[k, wrapped(i + 1, REGULAR)]
+                bend = max(bend, abs(stars[k, REGULAR] + here - before - after))
+                before, here = here, after
+    spare = softness * bend / (6 - 4 * softness)
+    return low - spare, high + spare, spare
 
 
 @inlined
@@ -272,11 +347,22 @@ def side_bounds(z, w, shape, r, side):
 
 
 @inlined
-def bounds(z, w, shape, r, side):
-    """Return bounds on a side, or on the patch if that is negative."""
+def bounds(z, w, shape, r, side, net, stars, ordinates):
+    """Return bounds on a side, or on the patch if that is negative.
+
+    Return also what softness may have moved them by; −1 where they are those of a hull.
+    """
     if side < 0:
-        return patch_bounds(z, w, shape, r)
-    return side_bounds(z, w, shape, r, side)
+        softness = regular_star(z, w, shape, r, stars, 0)
+        for k in range(1, 3):
+            if softness <= SOFTEST:
+                softness = max(softness, regular_star(z, w, shape, r + k, stars, k))
+        if softness <= SOFTEST:
+            return regular_bounds(stars, softness, net, ordinates)
+        low, high = patch_bounds(z, w, shape, r)
+    else:
+        low, high = side_bounds(z, w, shape, r, side)
+    return low, high, -1.0
 
 
 @inlined
@@ -291,29 +377,37 @@ def reached(placed, r):
 
 
 @inlined
-def explored(z, placed, w, shape, beta, child, sides, side, enough, steps):
+def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, side, enough, steps):
     """Return bounds of values on a patch or a side of a face, whose stars are the first three.
 
     Args:
         z, placed, w, shape: the face's stars, and room for those of its descendants.
-        child, sides: (DEEPEST + 1,) room.
+        beta, net: as of ``measure_faces``.
+        stars, ordinates, child, sides: room.
         side: a side of the face; negative: the patch.
         enough: bounds below this are good enough.
         steps: so often faces may be refined.
     """
-    low, high = bounds(z, w, shape, 0, side)
+    if steps == 0:
+        return patch_bounds(z, w, shape, 0) if side < 0 else side_bounds(z, w, shape, 0, side)
+    low, high, spare = bounds(z, w, shape, 0, side, net, stars, ordinates)
     worst, least = max(-low, high), 0.0
     if side < 0:
         least = min(abs(z[0, CENTRE]), abs(z[1, CENTRE]), abs(z[2, CENTRE]))
         if (z[0, CENTRE] > 0) != (z[1, CENTRE] > 0) or (z[0, CENTRE] > 0) != (z[2, CENTRE] > 0):
             least = 0.0
-    if steps == 0 or worst <= enough / 2 or (enough > 0 and least > FAR * enough):
+    if worst <= enough / 2 or (enough > 0 and least > FAR * enough):
+        return low, high
+    over = TIGHT * (worst - spare) - spare > enough
+    if spare >= 0 and (worst <= enough or (over and (enough > 0 or spare <= LITTLE * worst))):
         return low, high
     lowest, highest, found_low, found_high = -enough / 2, enough / 2, math.inf, -math.inf
     level, sides[0], child[0] = 0, side, 0
     for c in range(3):
         refine_star(z, w, shape, beta, c, placed)
-    if side < 0:
+    if 0 <= spare <= LITTLE * worst:
+        lowest, highest, steps = -enough, enough, 1
+    elif side < 0:
         # Nearer than needed to tell whether it is to be split, and how it can be cut, takes long.
         lowest, highest = reached(placed, 0)
         far = max(-lowest, highest)
@@ -344,7 +438,7 @@ def explored(z, placed, w, shape, beta, child, sides, side, enough, steps):
         else:
             for k in range(3):
                 middle_star(placed, w, shape, r + k, r + (k + 1) % 3, 1, z, to + k)
-        down, up = bounds(z, w, shape, to, of_child)
+        down, up, _ = bounds(z, w, shape, to, of_child, net, stars, ordinates)
         if level + 1 < steps and (max(down, low) < lowest or min(up, high) > highest):
             level += 1
             child[level], sides[level] = 0, of_child
@@ -375,6 +469,7 @@ def measure_faces(
     valence: i4_1d,
     rules: f8_2d,
     beta: f8_1d,
+    net: f8_2d,
     rows: i8_1d,
     triangles: f8_2d,
     compared: i4_2d,
@@ -383,6 +478,7 @@ def measure_faces(
     begin: int,
     end: int,
     numbers: f8_2d,
+    ordinates: f8_1d,
     whole: i8_2d,
     to: f8_2d,
 ):
@@ -395,18 +491,22 @@ def measure_faces(
         valence: (V,).
         rules: (V, 2) the weights of the rules of curves and of corners, and of the latter alone.
         beta: Loop's weight of one neighbour, for each valence.
+        net: (12, N) weights of a regular face's control points in the ordinates of its quartics:
+            of each corner, then of its neighbours 2, 3 and 4.
         rows: (N,) faces.
         triangles: (3 N, 3) corners of the triangles.
         compared: (N, 3) the triangle's side that each side of a face, from its corner on, is to be
             compared with as a curve; −1: none.
         enough: bounds below this are good enough; 0: none is.
         steps: so often faces may be refined.
-        numbers, whole: room of 9 (DEEPEST + 1) and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
+        numbers, whole: room of 9 (DEEPEST + 1) + 3 and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
+        ordinates: (N,) room.
         to: (N, 4) out: least and largest height over the triangle's plane; how far curves are from
             their sides; 1 where the bounds are not known.
     """
     each = 3 * (DEEPEST + 1)
-    z, placed, w = numbers[:each], numbers[each : 2 * each], numbers[2 * each :]
+    z, placed, w = numbers[:each], numbers[each : 2 * each], numbers[2 * each : 3 * each]
+    stars = numbers[3 * each :]
     around, edges, shape = whole[:3], whole[3:6], whole[6 : 6 + each]
     child, sides = whole[6 + each], whole[7 + each]
     for i in range(begin, end):
@@ -436,7 +536,9 @@ def measure_faces(
                     to[i, 1] = max(to[i, 1], norm(difference(row(points, around[c, j]), p)))
             continue
         set_values(points, corners, 3 * rows[i], around, shape, n, p, z)
-        low, high = explored(z, placed, w, shape, beta, child, sides, -1, enough, steps)
+        low, high = explored(
+            z, placed, w, shape, beta, net, stars, ordinates, child, sides, -1, enough, steps
+        )
         to[i, 0], to[i, 1] = min(low, 0.0), max(high, 0.0)
         for k in range(3):
             s = compared[i, k]
@@ -449,6 +551,8 @@ def measure_faces(
             away = 0.0
             for direction in (n, across_it):
                 set_values(points, corners, 3 * rows[i], around, shape, direction, origin, z)
-                low, high = explored(z, placed, w, shape, beta, child, sides, k, enough, steps)
+                low, high = explored(
+                    z, placed, w, shape, beta, net, stars, ordinates, child, sides, k, enough, steps
+                )
                 away += max(-low, high) ** 2
             to[i, 2] = max(to[i, 2], math.sqrt(away))

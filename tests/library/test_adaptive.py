@@ -196,6 +196,21 @@ def test_a_cube_stays_as_it_is():
     np.testing.assert_array_equal(made.mesh.faces, faces)
 
 
+def test_a_rim_of_creases_is_as_near_as_its_faces_say():
+    mesh = drum()
+    made = refine(mesh, "loop", tolerance="0.1%", creases="angle:40")
+    dense = refine(mesh, "loop", 5, creases="angle:40").mesh
+    walls, tops = np.split(dense.faces, [32 * 4**5])
+    curve = dense.vertices[np.intersect1d(walls, tops)][:, None]
+    lids = made.face_parents >= 32
+    sides = np.stack([made.mesh.faces, np.roll(made.mesh.faces, -1, axis=1)], axis=-1)
+    a, b = made.mesh.vertices[sides[lids].reshape(-1, 2)].swapaxes(0, 1)
+    along = b - a
+    share = np.clip(((curve - a) * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
+    away = np.linalg.norm(curve - a - share[:, :, None] * along, axis=2).min(axis=1)
+    assert 0 < away.max() <= made.distances[lids].max() <= made.goal.tolerance
+
+
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_what_is_flat_stays_whole_beside_what_bends(scheme):
     """A sheet with a bump at one end is split there alone."""
