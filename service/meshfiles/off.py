@@ -82,6 +82,9 @@ def _mesh(
     if widths[COLOUR] not in (0, 3, 4):
         lost["values of vertices"] = len(table)
         del parts[COLOUR]
+    elif widths[NORMAL] and widths[COLOUR] and _is_colour_first(parts[NORMAL], parts[COLOUR]):
+        both = np.hstack([parts[NORMAL], parts[COLOUR]])
+        parts[COLOUR], parts[NORMAL] = both[:, :-3], both[:, -3:]
     face_values: dict[str, np.ndarray] = {}
     if of_faces is None:
         lost["colours of faces"] = len(sizes)
@@ -102,6 +105,15 @@ def _mesh(
         face_values=face_values,
         changes=dropped(lost),
     )
+
+
+def _is_colour_first(normals: np.ndarray, colours: np.ndarray) -> bool:
+    """Return whether normals and colours stand in MeshLab's order, which is not Geomview's.
+
+    No colour is negative, and no normal has whole numbers beyond 1.
+    """
+    whole = (normals == np.rint(normals)).all() and (normals > 1).any()
+    return bool(whole or (colours < 0).any())
 
 
 def _of_binary(data: bytes, at: int, prefix: bytes) -> MeshFile:

@@ -93,6 +93,7 @@ def test_seams_make_no_difference_to_the_surface() -> None:
 
 
 CUT = "triangles added by cutting polygons"
+TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
 POLYGONS = {
     "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4\nf 1 3 5\nf 1 2 3 5 4\n",
     "off": b"# comment\nOFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n"
@@ -258,6 +259,19 @@ def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: 
     assert sum(counts) + report["dropped"]["vertices"] == unused
 
 
+@pytest.mark.parametrize("normal", ["0 0 1", "-0.6 0 0.8", "0 0 -2.5"])
+@pytest.mark.parametrize("form", ["{normal} {colour}", "{colour} {normal}"])
+def test_colours_and_normals_of_an_off_are_told_apart_in_either_order(
+    form: str, normal: str
+) -> None:
+    # Geomview puts normals first, MeshLab colours.
+    behind = " " + form.format(normal=normal, colour="255 128 0 255") + "\n"
+    data = b"NCOFF\n3 1 0\n" + TRIANGLE.replace(b"\n", behind.encode()) + b"3 0 1 2\n"
+    layers = formats.read(data, "off").layers
+    assert layers[COLOUR].values.tolist() == [[255, 128, 0, 255]] * 3
+    np.testing.assert_array_equal(layers[NORMAL].values, [[*map(float, normal.split())]] * 3)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "data", [b"", b"garbage", b"\0" * 200, b"ply\nformat ascii 1.0\n", b"OFF\n3 1 0\n0 0 0\n"]
@@ -265,9 +279,6 @@ def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: 
 def test_what_is_no_mesh_is_unreadable(kind: str, data: bytes) -> None:
     with pytest.raises(UnreadableError):
         formats.read(data, kind)
-
-
-TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
 
 
 @pytest.mark.parametrize(
