@@ -39,7 +39,7 @@ PICTURES = (
     ),
     Picture(
         "blender-subsurf.png",
-        ("suzanne", "cube", "cylinder", "spot.obj"),
+        ("suzanne", "cube", "cylinder", "cone", "spot.obj"),
         ("clay",),
         30,
         (

@@ -21,6 +21,7 @@ MADE = {
     "suzanne": lambda path: bpy.ops.mesh.primitive_monkey_add(rotation=(0, 0, 0)),
     "cube": lambda path: bpy.ops.mesh.primitive_cube_add(),
     "cylinder": lambda path: bpy.ops.mesh.primitive_cylinder_add(vertices=16),
+    "cone": lambda path: bpy.ops.mesh.primitive_cone_add(vertices=16),
 }
 
 

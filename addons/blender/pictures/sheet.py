@@ -16,6 +16,8 @@ from .variants import Shape
 
 # Of a cell, the part that is left free around its mesh; of a cell's height, that of a row of text.
 MARGIN, TEXT = 0.06, 0.11
+# Each row is so much nearer to the eye than the one above, which would throw its shadow on it.
+NEARER = 6.0
 FIELDS = {"distance": "Distance from Loop", "ratio": "Proximity ratio"}
 
 
@@ -48,9 +50,9 @@ def build(rows: Sequence[Row], turns: Sequence[float] = (0.0,)) -> Layout:
     for column, shape in enumerate(rows[0].shapes):
         text(shape.title, left + column + 0.5, top - 0.6 * TEXT, 0.07)
     top -= TEXT
-    for row, (wide, _), height in zip(rows, extents, heights, strict=True):
+    for number, (row, (wide, _), height) in enumerate(zip(rows, extents, heights, strict=True)):
         scale = (1 - 2 * MARGIN) / wide
-        _build_row(row, left, top, height, scale, turns)
+        _build_row(row, (left, top - height / 2, NEARER * number), scale, turns)
         top -= height
     camera(columns, total)
     light()
@@ -90,9 +92,9 @@ def legend(title: str, highest: float, across: float, along: float) -> None:
 
 
 def _build_row(
-    row: Row, left: float, top: float, height: float, scale: float, turns: Sequence[float]
+    row: Row, where: tuple[float, float, float], scale: float, turns: Sequence[float]
 ) -> None:
-    middle = top - height / 2
+    left, middle, depth = where
     if row.look in LOOKS:
         material = LOOKS[row.look]()
         shown = [True] * len(row.shapes)
@@ -104,7 +106,7 @@ def _build_row(
         legend(FIELDS[row.look], highest, left + free + 0.5, middle)
     for column, (shape, show) in enumerate(zip(row.shapes, shown, strict=True)):
         if show:
-            place(shape, material, at(left + column + 0.5, middle), scale, turns)
+            place(shape, material, at(left + column + 0.5, middle, depth), scale, turns)
 
 
 def place(
@@ -134,6 +136,11 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
     mesh.update(calc_edges=True)
     if shape.smooth:
         mesh.shade_smooth()
+        ends = np.empty(2 * len(mesh.edges), np.int32)
+        mesh.edges.foreach_get("vertices", ends)
+        keys, sharp = (_keys(pairs, len(shape.vertices)) for pairs in (ends, shape.sharp))
+        marks = mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE")
+        marks.data.foreach_set("value", np.isin(keys, sharp))
     else:
         mesh.shade_flat()
     for name, values in shape.fields.items():
@@ -141,6 +148,12 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
         field.data.foreach_set("value", values.astype(np.float32))
     mesh.materials.append(material)
     return mesh
+
+
+def _keys(pairs: np.ndarray, count: int) -> np.ndarray:
+    """Return a number for each edge, whichever end comes first."""
+    ends = np.sort(pairs.reshape(-1, 2).astype(np.int64), axis=1)
+    return count * ends[:, 0] + ends[:, 1]
 
 
 def centred(shape: Shape) -> np.ndarray:
