@@ -270,11 +270,11 @@ def write_off(mesh: MeshFile) -> bytes:
     kept = {name: mesh.layers[name] for name in (NORMAL, COLOUR, UV) if name in mesh.layers}
     prefix = f"{'ST' * (UV in kept)}{'C' * (COLOUR in kept)}{'N' * (NORMAL in kept)}"
     columns, form = [mesh.vertices], f"{NUMBER} {NUMBER} {NUMBER}"
-    for layer in kept.values():
+    for name, layer in kept.items():
         values = np.zeros((len(mesh.vertices), layer.values.shape[1]))
         values[mesh.corners] = layer.values[layer.rows]
         columns.append(values)
-        form += _form(layer.values) * values.shape[1]
+        form += (_form(layer.values) if name == COLOUR else f" {NUMBER}") * values.shape[1]
     pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n"]
     pieces += rows_text(f"{form}\n", np.hstack(columns))
     colours = mesh.face_values.get(COLOUR)
@@ -289,5 +289,6 @@ def write_off(mesh: MeshFile) -> bytes:
     return "".join(pieces).encode()
 
 
-def _form(values: np.ndarray) -> str:
-    return " %d" if values.dtype.kind in "ui" else f" {NUMBER}"
+def _form(colours: np.ndarray) -> str:
+    """Return how components are written: a fraction with its point, since 1 is one of 255."""
+    return " %d" if colours.dtype.kind in "ui" else " %#.12g"

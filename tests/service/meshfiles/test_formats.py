@@ -272,6 +272,13 @@ def test_colours_and_normals_of_an_off_are_told_apart_in_either_order(
     np.testing.assert_array_equal(layers[NORMAL].values, [[*map(float, normal.split())]] * 3)
 
 
+def test_white_of_fractions_is_no_one_of_255_in_an_off() -> None:
+    white = b"".join(b"v %s 1 1 1\n" % line for line in TRIANGLE.splitlines())
+    lines = formats.write(formats.read(white + b"f 1 2 3\n", "obj"), "off").splitlines()
+    assert lines[0] == b"COFF"
+    assert all(b"." in word for line in lines[2:5] for word in line.split()[3:])
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "data", [b"", b"garbage", b"\0" * 200, b"ply\nformat ascii 1.0\n", b"OFF\n3 1 0\n0 0 0\n"]
