@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
 
@@ -39,11 +39,11 @@ class Blocks:
 
     def quiet(self) -> Blocks:
         """Return a copy without the progress callback."""
-        return replace(self, before=no_progress)
+        return self if self.before is no_progress else Blocks(self.threads, rows=self.rows)
 
     def of_rows(self, rows: int) -> Blocks:
         """Return a copy with blocks of a fixed number of rows."""
-        return replace(self, rows=rows)
+        return Blocks(self.threads, self.before, rows)
 
     def owners(self, count: int) -> Blocks:
         """Return a copy with at most one block a thread, for loops that read all edges each."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from numbers import Integral, Real
 
 import numpy as np
@@ -21,6 +22,15 @@ def is_number(value: object) -> bool:
 def is_bool(value: object) -> bool:
     """Return whether a value is True or False, numpy's too."""
     return isinstance(value, bool | np.bool_)
+
+
+def is_masked(values: object) -> bool:
+    """Return whether an array hides some of its values; numpy would read what lies under the mask.
+
+    Where numpy's module of such arrays is not loaded, there is none.
+    """
+    masked = sys.modules.get("numpy.ma")
+    return masked is not None and masked.is_masked(values)
 
 
 def is_whole(value: object) -> bool:

@@ -34,6 +34,7 @@ from pns_common.report import (
     limit_distances,
     longest,
 )
+from pns_common.schemes.base_scheme import BaseScheme
 from pns_common.schemes.limit import limit_normals, limit_positions, limit_shift
 from pns_common.schemes.matrix import SubdivisionMatrix, subdivision_matrix
 
@@ -75,21 +76,37 @@ class Refinement:
         mesh: the refined mesh.
         ratio, gate: (V,) proximity ratio and gate of the last level; 0 at old vertices without a
             vertex rule, and after levels of the base scheme.
-        normals: (V, 3) exact normals of the limit surface, on creases the mean of both sides';
-            None unless vertices were put on it.
         steps: the levels, from which the report is made when it is first read.
-        scheme, limit_shift: for the report.
+        scheme: for the report.
+        surface: the refined mesh's connectivity where vertices were put on the limit surface; else
+            None.
         selected: what is left where some faces were refined alone; None: all were.
     """
 
     mesh: Mesh
     ratio: Float[np.ndarray, " V"]
     gate: Float[np.ndarray, " V"]
-    normals: Float[np.ndarray, "V 3"] | None
     steps: Sequence[Step] = field(repr=False)
     scheme: Scheme = field(repr=False)
-    limit_shift: float = field(repr=False)
+    surface: Topology | None = field(repr=False)
     selected: Selected | None = field(repr=False, default=None)
+
+    @cached_property
+    def normals(self) -> Float[np.ndarray, "V 3"] | None:
+        """(V, 3) exact normals of the limit surface, on creases the mean of both sides'.
+
+        None unless vertices were put on it. They are computed when they are first read.
+        """
+        if self.surface is None:
+            return None
+        normals = limit_normals(*self._surface()).vertices
+        return normals if self.selected is None else normals[self.selected.vertices]
+
+    def _surface(self) -> tuple[Float[np.ndarray, "V 3"], Topology, Blocks, BaseScheme]:
+        """Return what limits are computed from."""
+        assert self.surface is not None
+        last = self.steps[-1]
+        return last.points, self.surface, last.level.blocks.quiet(), self.scheme.base
 
     @cached_property
     def reference_length(self) -> float:
@@ -100,14 +117,15 @@ class Refinement:
     def report(self) -> Report:
         """Counts and diagnostics; see ``Report``."""
         levels = [step.report() for step in self.steps]
+        shift = 0.0 if self.surface is None else limit_shift(*self._surface())
         return {
             "scheme": self.scheme.name,
             "budget": self.scheme.budget,
             "model": self.scheme.model,
             "model_hash": self.scheme.model_hash,
             "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.steps[0].level.multi_fan_vertices.sum()),
-            **limit_distances(levels, self.limit_shift),
+            "multi_fan_vertices": int(self.steps[0].level.topology.multi_fan_vertices.sum()),
+            **limit_distances(levels, shift),
             "levels": levels,
         }
 
@@ -125,7 +143,7 @@ class Refinement:
         levels and its limit masks; what a model adds to positions is not linear and no part of it.
         """
         base = self.scheme.base
-        to_limit = None if self.normals is None else partial(limit_positions, base=base)
+        to_limit = None if self.surface is None else partial(limit_positions, base=base)
         made = subdivision_matrix(self.topologies, base, at_last=to_limit)
         if self.selected is None:
             return made
@@ -201,6 +219,11 @@ def refine(
         ParameterError: an argument out of range, or a crease that is no edge.
         ModelError: the network's answer is not finite, or has another shape.
         MeshError: the refined coordinates are too large, or not numbers.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> refine(mesh, "loop", levels=2).mesh.face_count
+        64
     """
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
@@ -242,16 +265,13 @@ def refine(
         level = steps[-1].level  # without measurements
         if told:
             told.level_ends()
-    points, normals, shift = steps[-1].points, None, 0.0
+    points, last = steps[-1].points, None
     if not limit:
         refined = scheme.base.faces(level.topology, blocks, np.int64)
     else:
         last = scheme.base.split(level.topology, blocks)
         refined = last.corners.astype(np.int64).reshape(last.face_count, -1)
-        surface = last, blocks, scheme.base
-        shift = limit_shift(points, *surface)
-        normals = limit_normals(points, *surface).vertices
-        points = limit_positions(points, *surface)
+        points = limit_positions(points, last, blocks, scheme.base)
         if told:
             told.level_ends()
     added, nothing = steps[-1].added, np.broadcast_to(0.0, len(points))
@@ -262,17 +282,15 @@ def refine(
         rows = selected.vertices
         points, ratio, gate = points[rows], ratio[rows], gate[rows]
         points[: len(mesh.vertices)][selected.still] = mesh.vertices[selected.still]
-        normals = None if normals is None else normals[rows]
     return Refinement(
         mesh=Mesh.of_refined(points, refined)
         if selected is None
         else Mesh.of_refined(points, selected.corners, selected.offsets),
         ratio=ratio,
         gate=gate,
-        normals=normals,
         steps=steps,
         scheme=scheme,
-        limit_shift=shift,
+        surface=last,
         selected=selected,
     )
 
@@ -379,7 +397,14 @@ def refine_many(
     limit: bool = True,
     threads: int | None = None,
 ) -> list[Refinement]:
-    """Refine meshes one after the other, each with its own creases; None: no edge."""
+    """Refine meshes one after the other, each with its own creases; None: no edge.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> [made] = refine_many([(mesh, None)], named_scheme("loop"), levels=1)
+        >>> made.mesh.face_count
+        16
+    """
     return [
         refine(
             mesh, scheme, levels, reference_length, limit=limit, creases=creases, threads=threads
@@ -396,9 +421,10 @@ def _step(level: Level, scheme: Scheme, depth: int) -> Step:
         with np.errstate(over="ignore", invalid="ignore"):
             added = scheme.rule(level)
         points = added.points
+        check_coordinates(points, level.blocks)
     else:
+        # Means of points: not farther out than these.
         points = level.base.place(level.points, level.topology, level.blocks)
-    check_coordinates(points, level.blocks)
     kept = Level(level.points, level.topology, level.base, level.reference_length, level.blocks)
     return Step(kept, points, added)  # without measurements, which are most of the memory
 

@@ -122,3 +122,9 @@ def kinds_of(path: Path) -> list[str]:
         for kind, places in KINDS.items()
         if any(path.is_relative_to(TESTS / place) for place in places)
     ]
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    """Tests that are coroutines run on asyncio alone."""
+    return "asyncio"

@@ -1,6 +1,6 @@
 #!/bin/sh
 # A head and two workers of Ray as processes of this machine, one command on them, and their end:
-#   deploy/ray/processes.sh pns batch in/ out/ --report report.parquet
+#   deploy/ray/processes.sh pns batch in/ out/ --report report.jsonl
 # `--address` is added to the command.
 set -eu
 port=${RAY_PORT:-6379}

@@ -81,6 +81,16 @@ class Trail:
                 values = base.place(values[step.vertices], step.topology, blocks)[step.kept]
         return made[self.rows]
 
+    def normals(self) -> Float[np.ndarray, "W 3"]:
+        """Return the normals of the limit surface at the written vertices."""
+        made = np.zeros((int(self.rows.max(initial=-1)) + 1, 3))
+        base, blocks = self.levels.base, self.levels.blocks.quiet()
+        for own in chain.from_iterable(self.settled):
+            known = own.names < len(made)
+            turned = limit_normals(own.points, own.topology, blocks, base).vertices[own.rows]
+            made[own.names[known]] = turned[known]
+        return made[self.rows]
+
     def matrix(self, count: int) -> SubdivisionMatrix:
         """Return the matrix S with ``S @ values = carry(values)`` of ``count`` control vertices."""
         base, blocks = self.levels.base, self.levels.blocks.quiet()
@@ -145,6 +155,11 @@ class AdaptiveRefinement(Refinement):
     control: Level = field(repr=False)
 
     @cached_property
+    def normals(self) -> Float[np.ndarray, "V 3"]:
+        """(V, 3) exact normals of the limit surface, computed when they are first read."""
+        return self.trail.normals()
+
+    @cached_property
     def reference_length(self) -> float:
         """R, the unit of length of the budget."""
         return reference_length_of(self.control)
@@ -183,8 +198,8 @@ class AdaptiveRefinement(Refinement):
             "model": self.scheme.model,
             "model_hash": self.scheme.model_hash,
             "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.control.multi_fan_vertices.sum()),
-            **limit_distances(learned, self.limit_shift),
+            "multi_fan_vertices": int(self.control.topology.multi_fan_vertices.sum()),
+            **limit_distances(learned),
             "levels": learned,
             "adaptive": {
                 "tolerance": self.goal.tolerance,
@@ -337,22 +352,17 @@ def _written(
         # The control mesh's vertices and the first new ones end there together, a level later.
         after = settled[1] if len(settled) > 1 else []
         settled = [[], settled[0] + after, *settled[2:]]
-    normals = np.zeros_like(tree.places)
-    for own in chain.from_iterable(settled):
-        turned = limit_normals(own.points, own.topology, levels.blocks, levels.base)
-        normals[own.names] = turned.vertices[own.rows]
     steps = [layer.step for layer in tree.layers if layer.step is not None]
-    points, shift = tree.places[rows], 0.0
+    points = tree.places[rows]
     check_coordinates(points, levels.blocks)
     nothing = np.broadcast_to(0.0, len(rows))
     return AdaptiveRefinement(
         mesh=Mesh.of_refined(points, number[names]),
         ratio=nothing,
         gate=nothing,
-        normals=normals[rows],
         steps=[] if first is None else [first],
         scheme=scheme,
-        limit_shift=shift,
+        surface=None,
         face_parents=codes >> (2 * depths),
         weights=weights,
         face_levels=depths,

@@ -110,6 +110,11 @@ def subdivide(
             alone and the scheme makes quads; and as ``refine``.
         MeshError: it has cells that are no faces; and as ``refine`` and ``Mesh``.
         TypeError: an option of another name, with the nearest one.
+
+    Example:
+        >>> vertices, faces = subdivide((np.eye(3), np.array([[0, 1, 2]])), levels=1)
+        >>> faces.shape
+        (4, 3)
     """
     _check_names(options)
     given: Any = mesh

@@ -16,7 +16,7 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR
+from pns_common.kernels.connectivity import INTERIOR, triangle_of
 from pns_common.kernels.vectors import (
     NO_AREA,
     area_vector,
@@ -163,7 +163,7 @@ def squared_chord(normals, f, g):
 @inlined
 def _following(h):
     """Return the child at the corner where half-edge h ends."""
-    f = h // 3
+    f = triangle_of(h)
     i = h - 3 * f
     return 4 * f + (i + 1 if i < 2 else 0)
 
@@ -171,7 +171,7 @@ def _following(h):
 @inlined
 def _starting(h):
     """Return the child at the corner where half-edge h starts."""
-    f = h // 3
+    f = triangle_of(h)
     return 4 * f + h - 3 * f
 
 

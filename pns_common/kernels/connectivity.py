@@ -6,6 +6,8 @@ by first appearance over faces.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pns_common.kernels import (
     b1_1d,
     i1_1d,
@@ -196,22 +198,36 @@ def count_ends(edges: u4_2d, rows: i8_1d | u4_1d, counts: i4_1d):
 
 
 @inlined
+def triangle_of(h):
+    """Return h // 3 of h ≥ 0; compiled code of signed numbers would see to those below 0."""
+    return np.int64(np.uint64(h) // np.uint64(3))
+
+
+@inlined
 def next_corner(h):
     """Return the next corner of a triangle."""
-    return h + 1 - 3 * (h % 3 == 2)
+    return h + 1 - 3 * (np.uint64(h) % np.uint64(3) == np.uint64(2))
 
 
 @inlined
 def previous_corner(h):
     """Return the previous corner of a triangle."""
-    return h - 1 + 3 * (h % 3 == 0)
+    return h - 1 + 3 * (np.uint64(h) % np.uint64(3) == np.uint64(0))
+
+
+@inlined
+def opposite(corners, h):
+    """Return the vertex of a half-edge's triangle that is not on it."""
+    there = np.uint64(h)
+    first = there % np.uint64(3) == np.uint64(0)
+    return corners[there + np.uint64(2) if first else there - np.uint64(1)]
 
 
 @inlined
 def face_corners(h, offsets, face_of_corner):
     """Return the first corner of a corner's face, and the first after them."""
     if len(face_of_corner) == 0:
-        first = h - h % 3
+        first = 3 * triangle_of(h)
         return first, first + 3
     f = face_of_corner[h]
     return offsets[f], offsets[f + 1]
@@ -220,7 +236,7 @@ def face_corners(h, offsets, face_of_corner):
 @inlined
 def face_of(h, face_of_corner):
     """Return the face of a corner."""
-    return face_of_corner[h] if len(face_of_corner) else h // 3
+    return face_of_corner[h] if len(face_of_corner) else triangle_of(h)
 
 
 @inlined
@@ -267,7 +283,7 @@ def count_corners(corners: u4_1d, reach: i8_2d, begin: int, end: int, corner: i4
 
 
 @kernel
-def mark_multi_fan(
+def count_fans(
     offsets: i4_1d,
     face_of_corner: u4_1d,
     corner_edges: u4_1d,
@@ -277,14 +293,14 @@ def mark_multi_fan(
     count: i4_1d,
     begin: int,
     end: int,
-    multi_fan: b1_1d,
+    fans: i1_1d,
 ):
-    """Mark the vertices begin … end − 1 whose corners form more than one fan.
+    """Write how many fans the corners of vertices begin … end − 1 form: 0, 1, or 2 for more.
 
     Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
     """
     for v in range(max(begin, 0), end):
-        multi_fan[v] = False
+        fans[v] = 0
         if count[v] == 0:
             continue
         start = corner[v]
@@ -305,7 +321,7 @@ def mark_multi_fan(
                 if h < 0:
                     break
                 seen += 1
-        multi_fan[v] = seen != count[v]
+        fans[v] = 1 if seen == count[v] else 2
 
 
 # --- the split of triangles ----------------------------------------------------------------------
@@ -384,7 +400,7 @@ def number_halves(
 @inlined
 def _half_at(h, faces, vertex):
     """Return the half of a parent's half-edge that is at ``vertex``."""
-    f = h // 3
+    f = triangle_of(h)
     i = h - 3 * f
     if faces[f, i] == vertex:
         return 12 * f + 3 * i

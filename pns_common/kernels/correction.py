@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import f8_1d, f8_2d, i8_1d, inlined, kernel, u4_1d
+from pns_common.kernels import b1_1d, f8_1d, f8_2d, i1_1d, i8_1d, inlined, kernel, u4_1d, u4_2d
+from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.vectors import dot, norm, over, row
 
 # Products above this have all their digits.
@@ -82,6 +83,27 @@ def correct_by_equation_1(
         delta = size * turned[0], size * turned[1], size * turned[2]
         at = first + rows[i]
         _write(at, delta, gate[here], bound[here], displacement, ratio, gates, bounds)
+
+
+@kernel
+def place_flat(
+    points: f8_2d,
+    edges: u4_2d,
+    edge_class: i1_1d,
+    ringed: b1_1d,
+    base: f8_2d,
+    flat: f8_2d,
+):
+    """Write D of vertices and of edges, from x0 = ``base`` to flat; 0 where no network acts."""
+    count = points.shape[0]
+    for v in range(count):
+        for k in range(3):
+            flat[v, k] = points[v, k] - base[v, k] if ringed[v] else 0.0
+    for e in range(edges.shape[0]):
+        a, b, to, acts = edges[e, 0], edges[e, 1], count + e, edge_class[e] == INTERIOR
+        for k in range(3):
+            middle = (points[a, k] + points[b, k]) / 2
+            flat[to, k] = middle - base[to, k] if acts else 0.0
 
 
 @kernel

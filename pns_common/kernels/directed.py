@@ -1,6 +1,6 @@
 """Directed edges: their features and frames, what they say to each other, and what they answer.
 
-Edge e joins a < b. It stands for two directed edges: number e runs a → b, number E + e runs b → a.
+Edge e joins a < b. It stands for two directed edges: 2 e runs a → b, 2 e + 1 runs b → a.
 Each has a frame T (along it), N (the mean of both faces' normals, at right angles to T) and
 B = N × T; turned round, T and B change their signs. What a missing face would say is 0.
 """
@@ -23,7 +23,7 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, previous_corner
+from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, opposite
 from pns_common.kernels.frames import wing
 from pns_common.kernels.measures import LENGTH
 from pns_common.kernels.vectors import across, cross, difference, divisor, dot, norm, over, row
@@ -109,7 +109,7 @@ def _opposite(points, h, corners, offsets, face_of_corner):
     if len(face_of_corner):
         c = wing(points, h, corners, offsets, face_of_corner)
         return c[0], c[1], c[2]
-    return row(points, corners[previous_corner(h)])
+    return row(points, opposite(corners, h))
 
 
 @kernel
@@ -130,7 +130,7 @@ def directed_features(
     end: int,
     features: f4_2d | f8_2d,
 ):
-    """Write `directed-28` of edges begin … end − 1: first all a → b, then all b → a.
+    """Write `directed-28` of both ways of edges begin … end − 1.
 
     Args:
         fields, means: of the rings, ``kernels.measures``.
@@ -138,9 +138,7 @@ def directed_features(
         sizes: (V, 3) of ``measure_sizes``.
         features: (2 (end − begin), 28) out.
     """
-    count = end - begin
     for e in range(max(begin, 0), end):
-        there, back = e - begin, count + e - begin
         a, b = edges[e, 0], edges[e, 1]
         left, right = sides_of(e, corners, edges, half_edges, edge_class)
         n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
@@ -168,7 +166,7 @@ def directed_features(
         u2 = _soft(_local(row(means, b), t, up, side, size))
         r1, r2 = _length_ratio(h, logs[e], sizes, a), _length_ratio(h, logs[e], sizes, b)
         for way in range(2):
-            to = there if way == 0 else back
+            to = 2 * (e - begin) + way
             # The other way round T and B change their signs.
             s = 1.0 - 2.0 * way
             v, w = (a, b) if way == 0 else (b, a)
@@ -256,19 +254,19 @@ def gather(
     end: int,
     messages: f4_2d | f8_2d,
 ):
-    """Write what edges begin … end − 1 hear: first all a → b, then all b → a.
+    """Write what edges begin … end − 1 hear, both ways.
 
     A row of ``messages``, (2 (end − begin), 2 W + H), is the edge's own state, that of the reverse
     edge, and the sum of what both vertices tell: ``told``, (V, 2 H), holds what each tells the
     edges that leave it, and those that reach it.
     """
     width, hidden = states.shape[1], told.shape[1] // 2
-    count, edge_count = end - begin, edges.shape[0]
     for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]
-        i, j = e - begin, count + e - begin
+        i = 2 * (e - begin)
+        j = i + 1
         for k in range(width):
-            there, back = states[e, k], states[edge_count + e, k]
+            there, back = states[2 * e, k], states[2 * e + 1, k]
             messages[i, k], messages[i, width + k] = there, back
             messages[j, k], messages[j, width + k] = back, there
         for k in range(hidden):
@@ -296,14 +294,14 @@ def read_heads(
     """Write what edges begin … end − 1 answer, out of their frames.
 
     Args:
-        heads: (2 (end − begin), A): all a → b, then all b → a.
+        heads: (2 (end − begin), A), of both ways.
         asked: (E, 3) out: the mean of F z over both directions.
         leaving: (2 E, 3) out: F y.
         logits: (E,) out: the mean of both logits of sharpness.
     """
-    count, edge_count = end - begin, edges.shape[0]
     for e in range(max(begin, 0), end):
-        i, j = e - begin, count + e - begin
+        i = 2 * (e - begin)
+        j = i + 1
         a, b = edges[e, 0], edges[e, 1]
         left, right = sides_of(e, corners, edges, half_edges, edge_class)
         n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
@@ -316,9 +314,9 @@ def read_heads(
             z += (heads[i, EDGE + 2] - heads[j, EDGE + 2]) * side[k]
             asked[e, k] = z / 2
             y = heads[i, VERTEX] * t[k] + heads[i, VERTEX + 1] * up[k]
-            leaving[e, k] = y + heads[i, VERTEX + 2] * side[k]
+            leaving[2 * e, k] = y + heads[i, VERTEX + 2] * side[k]
             y = heads[j, VERTEX + 1] * up[k] - heads[j, VERTEX] * t[k]
-            leaving[edge_count + e, k] = y - heads[j, VERTEX + 2] * side[k]
+            leaving[2 * e + 1, k] = y - heads[j, VERTEX + 2] * side[k]
         logits[e] = (heads[i, SHARPNESS] + heads[j, SHARPNESS]) / 2
 
 
@@ -366,11 +364,11 @@ def mean_in_faces(
 
     Both directions count: a mirror puts the face to the left of the other one.
     """
-    edge_count = heights.shape[0] // 2
     for f in range(max(begin, 0), end):
         total = 0.0
         for h in range(offsets[f], offsets[f + 1]):
-            total += heights[corner_edges[h]] + heights[edge_count + corner_edges[h]]
+            e = corner_edges[h]
+            total += heights[2 * e] + heights[2 * e + 1]
         asked[f] = total / (2 * (offsets[f + 1] - offsets[f]))
 
 
@@ -386,11 +384,10 @@ def find_leaving(
         stops: (V,) where those of each vertex begin; on return, where they end.
         spokes: (2 E,) out.
     """
-    count = edges.shape[0]
-    for e in range(count):
+    for e in range(edges.shape[0]):
         for side in range(2):
             v = edges[e, side]
-            spokes[stops[v]] = e + side * count
+            spokes[stops[v]] = 2 * e + side
             stops[v] += 1
 
 

@@ -14,7 +14,7 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import next_corner, previous_corner
+from pns_common.kernels.connectivity import next_corner, previous_corner, triangle_of
 from pns_common.kernels.measures import HEIGHT
 from pns_common.kernels.vectors import (
     across,
@@ -103,7 +103,7 @@ def frames_and_features(
         ad, bd = corner_edges[next_corner(h2)], corner_edges[before2]
         if not forwards:
             ac, bc, ad, bd = bc, ac, bd, ad
-        n, m = row(normals, h1 // 3), row(normals, h2 // 3)
+        n, m = row(normals, triangle_of(h1)), row(normals, triangle_of(h2))
         t, up, side, x, fallback = edge_frame(n, m, between(points, a, b))
         if symmetric and fallback:
             x = 0.0

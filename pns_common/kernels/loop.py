@@ -6,6 +6,8 @@ reads all edges.
 
 from __future__ import annotations
 
+import math
+
 from pns_common.kernels import (
     f8_1d,
     f8_2d,
@@ -19,25 +21,17 @@ from pns_common.kernels import (
     u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, opposite, skipped_block
 
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
 MIDPOINT = 1 / 2
 CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
 
 
-@inlined
-def opposite(faces, half_edge):
-    """Return the vertex of a half-edge's triangle that is not on it."""
-    f = half_edge // 3
-    i = half_edge - 3 * f
-    return faces[f, i - 1 if i > 0 else 2]
-
-
 @kernel
 def place_edges(
     points: f8_2d,
-    faces: u4_2d,
+    corners: u4_1d,
     edges: u4_2d,
     half_edges: i4_2d,
     edge_class: i1_1d,
@@ -54,7 +48,7 @@ def place_edges(
     for e in range(max(begin, 0), end):
         a, b = edges[e, 0], edges[e, 1]
         if edge_class[e] == INTERIOR:
-            c, d = opposite(faces, half_edges[e, 0]), opposite(faces, half_edges[e, 1])
+            c, d = opposite(corners, half_edges[e, 0]), opposite(corners, half_edges[e, 1])
             for k in range(3):
                 ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
                 placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
@@ -104,18 +98,22 @@ def blend_rings(points: f8_2d, valence: i4_1d, beta: f8_1d, begin: int, end: int
 
 
 @kernel
-def sharpest_edges(edges: u4_2d, rows: u4_1d, sharpness: f8_1d, weights: f8_2d, neighbours: u4_2d):
+def sharpest_edges(edges: u4_2d, edge_class: i1_1d, soft: f8_1d, weights: f8_2d, neighbours: u4_2d):
     """Find the three sharpest edges at each vertex, in descending order of sharpness.
 
     Args:
         edges: (E, 2).
-        rows: (S,) edges of sharpness above 0, ascending.
-        sharpness: (E,).
+        soft: (E,) sharpness of interior edges; (0,) for 0 at all. Others have 1.
         weights: (V, 3) out; 0 on entry.
         neighbours: (V, 2) out: the far ends of the two sharpest.
     """
-    for e in rows:
-        w = sharpness[e]
+    for e in range(edges.shape[0]):
+        if edge_class[e] != INTERIOR:
+            w = 1.0
+        elif len(soft) and soft[e] > 0:
+            w = soft[e]
+        else:
+            continue
         for side in range(2):
             v, far = edges[e, side], edges[e, 1 - side]
             if w > weights[v, 0]:
@@ -162,6 +160,23 @@ def blend_sharp(
             placed[v, k] = at_sharpness(
                 placed[v, k], curve, points[v, k], weights[v, 1], weights[v, 2]
             )
+
+
+@kernel
+def find_box(points: f8_2d, low: f8_1d, high: f8_1d):
+    """Write the least and the largest of each coordinate; NaN where one is."""
+    for k in range(3):
+        low[k], high[k] = math.inf, -math.inf
+    for v in range(points.shape[0]):
+        for k in range(3):
+            x = points[v, k]
+            if not x >= low[k]:
+                low[k] = x
+            if not x <= high[k]:
+                high[k] = x
+            if x != x:
+                low[k] = high[k] = x
+                return
 
 
 @kernel

@@ -14,7 +14,7 @@ from pns_common.kernels import measures
 from pns_common.mesh.normals import measure_faces
 from pns_common.mesh.topology import MOSTLY_SHARP, Topology, check_vertices
 from pns_common.parallel import Blocks
-from pns_common.parameters import is_number, is_whole
+from pns_common.parameters import is_masked, is_number, is_whole
 
 HALF_TURN = 180
 _ANGLE = re.compile(r"angle:(\d{1,3}(?:\.\d+)?)")
@@ -49,6 +49,10 @@ class Creases:
         ParameterError: pairs or vertices that are no whole numbers, sharpness that is not one
             number from 0 to 1 a pair, or from 0 on a vertex, an angle outside 0 … 180, levels
             below 1, or another border.
+
+    Example:
+        >>> Creases(np.array([[0, 1]]), sharpness=np.array([0.5])).levels is None
+        True
     """
 
     named: Integer[np.ndarray, "N 2"] | None = None
@@ -237,8 +241,7 @@ def as_pairs(creases: Any) -> Integer[np.ndarray, "N 2"]:
     Raises:
         ParameterError: they are something else.
     """
-    # numpy would read what lies under the mask.
-    if np.ma.is_masked(creases):
+    if is_masked(creases):
         raise ParameterError("creases.mask", True, expected="no masked values")
     try:
         pairs = np.asarray(creases)
@@ -266,7 +269,7 @@ def as_vertices(given: Any) -> Integer[np.ndarray, " M"]:
     """Return a copy of numbers of vertices. Raises ParameterError: they are something else."""
     values = np.asarray(given)
     whole = values.dtype.kind in "iu" or values.size == 0
-    if np.ma.is_masked(given) or values.ndim != 1 or not whole:
+    if is_masked(given) or values.ndim != 1 or not whole:
         expected = "(M,) whole numbers of vertices"
         raise ParameterError("vertices", f"{values.dtype} {values.shape}", expected=expected)
     return values.astype(np.int64)

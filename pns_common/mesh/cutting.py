@@ -120,6 +120,11 @@ def cut_concave(mesh: Mesh) -> Mesh:
     Raises:
         ParameterError: it is no Mesh.
         ImportError: a polygon is to be cut, and mapbox_earcut is not installed.
+
+    Example:
+        >>> arrow = Mesh([[0, 0, 0], [4, -1, 0], [1, 0, 0], [4, 1, 0]], [[0, 1, 2, 3]])
+        >>> cut_concave(arrow).face_count
+        2
     """
     check_is_mesh(mesh)
     pieces = convex_pieces(mesh.vertices, mesh.offsets, mesh.corners)

@@ -15,8 +15,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import MeshError, ParameterError
+from pns_common.kernels import loop as kernels
 from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
+from pns_common.parameters import is_masked
 
 # Fourth powers of lengths (squared cross products) must neither overflow nor vanish in float64.
 LARGEST_COORDINATE = 1e75
@@ -50,6 +52,10 @@ class Mesh:
         MeshError: wrong shapes or types, no faces, a face of fewer than three corners, a masked
             number, a NaN, infinite or huge coordinate, an extent too small to compute with, or an
             index out of range; the error names the element.
+
+    Example:
+        >>> Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).face_count
+        1
     """
 
     __slots__ = ("_faces", "_offsets", "corners", "vertices")
@@ -64,14 +70,12 @@ class Mesh:
             raise MeshError(f"shape {given.shape}, expected (V, 3)", element="vertices")
         if given.dtype.kind not in "fiu":
             raise MeshError(f"type {given.dtype}, expected real numbers", element="vertices")
-        corners, offsets = as_polygons(faces, len(given))
+        corners, offsets, degree = _faces_of(faces, len(given))
         if len(corners) == 0:
             raise MeshError("no faces to refine", element="faces")
         points = np.array(given, dtype=np.float64, order="C")
         _check_coordinates(points)
-        degrees = np.diff(offsets)
-        uniform = (degrees == degrees[0]).all()
-        self._keep(points, corners, offsets, int(degrees[0]) if uniform else None)
+        self._keep(points, corners, offsets, degree)
 
     def _keep(
         self,
@@ -153,7 +157,7 @@ class Mesh:
         """Start of each face's corners, and the end of the last ones: (F + 1,)."""
         if self._offsets is not None:
             return self._offsets
-        return np.arange(0, len(self.corners) + 1, int(self.faces.shape[1]))
+        return _regular(len(self.corners), self.faces.shape[1])
 
     @property
     def face_count(self) -> int:
@@ -199,9 +203,7 @@ class Mesh:
         """
         if offsets is None:
             return _kept(vertices, faces.reshape(-1), None, faces.shape[1])
-        degrees = np.diff(offsets)
-        degree = int(degrees[0]) if (degrees == degrees[0]).all() else None
-        return _kept(vertices, faces, offsets, degree)
+        return _kept(vertices, faces, offsets, _common_degree(offsets))
 
 
 def _read_obj(path: Path) -> tuple[list[list[float]], list[list[int]]]:
@@ -271,6 +273,11 @@ def clean(mesh: Mesh) -> Cleaned:
     Raises:
         ParameterError: it is no Mesh.
         MeshError: every face is degenerate.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [2, 1, 0], [0, 1, 1]])
+        >>> clean(mesh).mesh.face_count
+        1
     """
     check_is_mesh(mesh)
     degrees, leader = np.diff(mesh.offsets), np.arange(mesh.face_count)
@@ -321,6 +328,8 @@ def fans(
 ) -> tuple[Integer[np.ndarray, "T 3"], Integer[np.ndarray, " T"]]:
     """Return the corners of the triangles that faces are cut into, and the face of each."""
     counts = np.diff(offsets) - 2
+    if (counts == 1).all():
+        return np.arange(3 * len(counts)).reshape(-1, 3), np.arange(len(counts))
     face = np.repeat(np.arange(len(counts)), counts)
     step = np.arange(len(face)) - (np.cumsum(counts) - counts)[face] + 1
     first = offsets[face]
@@ -352,7 +361,14 @@ def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         MeshError: as ``Mesh``.
     """
+    corners, offsets, degree = _faces_of(faces, vertex_count)
+    return corners, _regular(len(corners), degree or TRIANGLE) if offsets is None else offsets
+
+
+def _faces_of(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray | None, int | None]:
+    """Return corners, offsets, and the degree of all faces; no offsets of a table's rows."""
     several = isinstance(faces, list | tuple)
+    degree: int | None = None
     given: list[Any] = list(faces) if several else []  # pyright: ignore[reportUnknownArgumentType]
     rows = [_array(face, "faces") for face in given]
     degrees = [face.size for face in rows]
@@ -367,21 +383,36 @@ def as_polygons(faces: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     else:
         table = _array(given if several else faces, "faces")
         if table.size == 0:
-            return np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
+            return np.zeros(0, dtype=np.int64), None, None
         if table.ndim != 2:
             raise MeshError(f"shape {table.shape}, expected (F, 3)", element="faces")
-        corners = table.reshape(-1)
-        offsets = np.arange(0, corners.size + 1, int(table.shape[1]), dtype=np.int64)
+        corners, offsets = table.reshape(-1), None
+        degree = table.shape[1]
     if len(corners) and corners.dtype.kind not in "iu":
         raise MeshError(f"type {corners.dtype}, expected integers", element="faces")
-    few = np.flatnonzero(np.diff(offsets) < TRIANGLE)
+    counts = np.full(1, degree) if offsets is None else np.diff(offsets)
+    few = np.flatnonzero(counts < TRIANGLE)
     if len(few):
-        count = int(np.diff(offsets)[few[0]])
-        reason = f"{count} corners, expected at least 3"
+        reason = f"{counts[few[0]]} corners, expected at least 3"
         raise MeshError(reason, element="face", index=int(few[0]))
     # Before the cast: an index of 2⁶⁴ − 1 would become −1.
-    _check_indices(corners, offsets, vertex_count)
-    return np.array(corners, dtype=np.int64), offsets.astype(np.int64)
+    _check_indices(corners, offsets, degree, vertex_count)
+    corners = np.array(corners, dtype=np.int64)
+    if offsets is None:
+        return corners, None, degree
+    offsets = offsets.astype(np.int64)
+    return corners, offsets, _common_degree(offsets)
+
+
+def _regular(count: int, degree: int) -> Integer[np.ndarray, " F1"]:
+    """Return the offsets of faces that have one degree and so many corners together."""
+    return np.arange(0, count + 1, degree)
+
+
+def _common_degree(offsets: Integer[np.ndarray, " F1"]) -> int | None:
+    """Return the degree of all faces; None if they differ, or there is none."""
+    degrees = np.diff(offsets)
+    return int(degrees[0]) if len(degrees) and (degrees == degrees[0]).all() else None
 
 
 def _check_offsets(offsets: np.ndarray, count: int) -> None:
@@ -391,20 +422,22 @@ def _check_offsets(offsets: np.ndarray, count: int) -> None:
         raise MeshError(f"offsets {offsets.tolist()[:4]} …, expected {expected}", element="faces")
 
 
-def _check_indices(corners: np.ndarray, offsets: np.ndarray, vertex_count: int) -> None:
+def _check_indices(
+    corners: np.ndarray, offsets: np.ndarray | None, degree: int | None, vertex_count: int
+) -> None:
     if len(corners) == 0 or (corners.min() >= 0 and corners.max() < vertex_count):
         return
     outside = np.flatnonzero((corners < 0) | (corners >= vertex_count))
     first: int = outside[0]
+    offsets = _regular(len(corners), degree or TRIANGLE) if offsets is None else offsets
     worst = int(np.searchsorted(offsets, first, side="right")) - 1
     face = corners[offsets[worst] : offsets[worst + 1]].tolist()
     raise MeshError(f"indices {face}, expected 0 … {vertex_count - 1}", element="face", index=worst)
 
 
 def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:
-    # One column at a time: numpy reduces a contiguous column many times faster than rows of three.
-    columns = [np.ascontiguousarray(vertices[:, k]) for k in range(3)]
-    low, high = (np.array([reduce(column) for column in columns]) for reduce in (np.min, np.max))
+    low, high = np.empty((2, 3))
+    kernels.find_box(vertices, low, high)
     # Written so that NaN fails it too.
     if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
         fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)
@@ -449,8 +482,7 @@ def _first_alike(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Intege
 
 def _array(values: object, element: str) -> np.ndarray:
     """Return what numpy makes of the input, refused where rows differ in length or have holes."""
-    if np.ma.is_masked(values):
-        # numpy would read what lies under the mask.
+    if is_masked(values):
         raise MeshError("masked numbers, expected three in each row", element=element)
     try:
         return np.asarray(values)

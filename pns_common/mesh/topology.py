@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Integer, UInt32
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import connectivity as kernels
 from pns_common.kernels import loop
-from pns_common.parallel import Blocks
+from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
 STEPS = 32
@@ -162,11 +162,6 @@ class Topology:
         return creases | (self.soft > MOSTLY_SHARP) if len(self.soft) else creases
 
     @property
-    def wears(self) -> Bool[np.ndarray, " E"]:
-        """Flags of the edges that are sharp for so many levels."""
-        return self.wear > 0 if len(self.wear) else np.zeros(len(self.edges), dtype=bool)
-
-    @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
         made = np.zeros(self.vertex_count)
@@ -186,24 +181,31 @@ class Topology:
         Where sharpness is learned, corners too, soft edges do not count at the ends of boundaries,
         so that meshes that share a boundary still meet there.
         """
-        if not (len(self.sharp_edges) or len(self.soft) or self.has_corners):
+        if not (self.edge_class.any() or len(self.soft) or self.has_corners):
             return None
-        edges = self.sharp_edges
-        if len(self.soft):
-            edges = np.flatnonzero(self.sharpness > 0).astype(np.uint32)
+        weights, neighbours = self._sharpest_of(self.soft)
+        if len(self.soft) and len(self.soft_corners):
+            on_boundary = self.edge_class == kernels.BOUNDARY
+            if on_boundary.any():
+                ends = np.unique(self.edges[on_boundary])
+                marked = np.where(self.wear > 0, self.soft, 0.0) if len(self.wear) else NO_WEIGHTS
+                at_ends, beside = self._sharpest_of(marked)
+                weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
+        if self.has_corners:
+            corner = self.corner_weights
+            rows = np.flatnonzero(corner)
+            corner = corner[rows, None]
+            weights[rows] = corner + (1 - corner) * weights[rows]
+        return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
+
+    def _sharpest_of(
+        self, soft: Float[np.ndarray, " S"]
+    ) -> tuple[Float[np.ndarray, "V 3"], UInt32[np.ndarray, "V 2"]]:
+        """Return ``SharpVertices``'s weights and neighbours of edges, with soft edges as given."""
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
-        loop.sharpest_edges(self.edges, edges, self.sharpness, weights, neighbours)
-        if len(self.soft) and len(self.soft_corners):
-            ends = np.unique(self.edges[self.edge_class == kernels.BOUNDARY])
-            at_ends, beside = np.zeros_like(weights), np.zeros_like(neighbours)
-            marked = edges[(self.soft[edges] == 0) | self.wears[edges]]
-            loop.sharpest_edges(self.edges, marked, self.sharpness, at_ends, beside)
-            weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
-        if self.has_corners:
-            corner = self.corner_weights[:, None]
-            weights = corner + (1 - corner) * weights
-        return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
+        loop.sharpest_edges(self.edges, self.edge_class, soft, weights, neighbours)
+        return weights, neighbours
 
     @cached_property
     def valence(self) -> Integer[np.ndarray, " V"]:
@@ -213,22 +215,22 @@ class Topology:
     @cached_property
     def edge_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of edges."""
-        return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS)
+        return _reach(self.edges.reshape(-1), 2 * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
     def corner_reach(self) -> Integer[np.ndarray, "B 2"]:
         """Smallest and largest vertex of each block of corners."""
-        return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS)
+        return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
         """True for vertices whose faces form more than one fan, as at the knot of a bow-tie."""
-        return self.multi_fans(Blocks())
+        return self.count_fans(Blocks()) > 1
 
-    def multi_fans(self, blocks: Blocks) -> Bool[np.ndarray, " V"]:
-        """Return ``multi_fan_vertices``, computed on several threads."""
+    def count_fans(self, blocks: Blocks) -> Integer[np.ndarray, " V"]:
+        """Return how many fans the faces of each vertex form: 0, 1, or 2 for more."""
         corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
-        marked = np.empty(self.vertex_count, dtype=bool)
+        made = np.empty(self.vertex_count, dtype=np.int8)
         blocks.owners(self.vertex_count).run(
             self.vertex_count,
             lambda begin, end: kernels.count_corners(
@@ -238,11 +240,11 @@ class Topology:
         fans = self.offsets, self.face_of_corner, self.corner_edges, self.half_edges
         blocks.run(
             self.vertex_count,
-            lambda begin, end: kernels.mark_multi_fan(
-                *fans, self.edge_class, corner, count, begin, end, marked
+            lambda begin, end: kernels.count_fans(
+                *fans, self.edge_class, corner, count, begin, end, made
             ),
         )
-        return marked
+        return made
 
     def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
@@ -462,7 +464,8 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     child_soft = NO_WEIGHTS
     if inherit and len(soft):
         child_soft = np.zeros(count)
-        child_soft[halves] = soft[:, None]
+        rows = np.flatnonzero(soft)
+        child_soft[halves[rows]] = soft[rows, None]
     made = Topology(
         vertex_count,
         faces.reshape(-1),
@@ -581,7 +584,12 @@ def _keys(pairs: Integer[np.ndarray, "N 2"], vertex_count: int) -> Integer[np.nd
     return wide.min(axis=1) * vertex_count + wide.max(axis=1)
 
 
-def _reach(vertices: UInt32[np.ndarray, " N"], each: int) -> Integer[np.ndarray, "B 2"]:
+def _reach(vertices: UInt32[np.ndarray, " N"], each: int, count: int) -> Integer[np.ndarray, "B 2"]:
     starts = np.arange(0, len(vertices), each)
-    ends = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
-    return np.stack(ends, axis=1).astype(np.int64)
+    made = np.zeros((len(starts), 2), dtype=np.int64)
+    if count < 2 * LEAST_ROWS:  # one thread reads all
+        made[:, 1] = count
+        return made
+    made[:, 0] = np.minimum.reduceat(vertices, starts)
+    made[:, 1] = np.maximum.reduceat(vertices, starts)
+    return made

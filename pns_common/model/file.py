@@ -71,6 +71,10 @@ def load_model(
         ParameterError: ``source`` is neither a name nor a path, or a provider is not available.
         ModelError: there is no such file, it breaks the contract (says which part), a bundled
             file is not the one that SHA256SUMS names, or there is no package onnx to check others.
+
+    Example:
+        >>> load_model("paper").name
+        'paper'
     """
     source = DEFAULT_MODEL if source is None else source
     if not isinstance(source, str | os.PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]

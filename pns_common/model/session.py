@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -135,6 +135,10 @@ class OnnxModel:
             session.get_modelmeta().custom_metadata_map[CARD_KEY]
         )
         self._networks = {network.given: network for network in networks(self.card)}
+        self._unread = {
+            network.given: np.zeros((1, network.columns), dtype=np.float32)
+            for network in self._networks.values()
+        }
 
     def __repr__(self) -> str:
         return f"OnnxModel(name={self.name!r}, hash={self.hash!r})"
@@ -164,7 +168,10 @@ class OnnxModel:
         if rows.ndim != 2 or rows.shape[1] != network.columns:
             expected = f"an array of shape (N, {network.columns})"
             raise ParameterError(given, rows.shape, expected=expected)
-        session, inputs = self._session(), self._unread_inputs(budget)
+        # onnxruntime asks for all inputs: a row for those that are not read.
+        session, inputs = self._session(), self._unread.copy()
+        if self.card.format != DIRECTED_FORMAT:
+            inputs["budget"] = np.asarray(budget, dtype=np.float32)
         chunks = list[np.ndarray]()
         for start in range(0, max(len(rows), 1), CHUNK_ROWS):
             chunk = rows[start : start + CHUNK_ROWS]
@@ -198,19 +205,9 @@ class OnnxModel:
         rows[:count] = chunk
         return rows[: count + -count % ROW_MULTIPLE]
 
-    def _unread_inputs(self, budget: float) -> dict[str, np.ndarray]:
-        """Return the budget, and one row for each input of features: onnxruntime asks for all."""
-        rows = {
-            network.given: np.zeros((1, network.columns), dtype=np.float32)
-            for network in self._networks.values()
-        }
-        if self.card.format == DIRECTED_FORMAT:
-            return rows
-        return {**rows, "budget": np.asarray(budget, dtype=np.float32)}
-
-    def _run(self, session: Any, output: str, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _run(self, session: Any, output: str, inputs: dict[str, np.ndarray]) -> np.ndarray:
         try:
-            (answer,) = session.run([output], dict(inputs))
+            (answer,) = session.run([output], inputs)
         except Exception as error:  # onnxruntime's errors share no base below Exception
             raise ModelError(
                 self.name, expected="a graph that runs to its end", found=_first_line(error)

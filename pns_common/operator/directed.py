@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Integer, UInt32
 
 from pns_common.errors import ModelError
 from pns_common.kernels import directed as kernels
@@ -71,7 +71,7 @@ class Answers:
 def directed_features(
     level: Level, begin: int, end: int, feature_type: type[np.floating[Any]] = np.float32
 ) -> Float[np.ndarray, "D 28"]:
-    """Return the features of edges begin … end − 1: first all a → b, then all b → a.
+    """Return the features of edges begin … end − 1: of each a → b, then b → a.
 
     ``level`` must have no marks: ``level.unmarked``.
     """
@@ -133,38 +133,13 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     Raises:
         ModelError: an answer is not finite, or has another shape.
     """
-    mesh, width, kind = level.topology, networks.width, networks.feature_type
-    edges, count = mesh.edges, len(mesh.edges)
+    mesh, edges, count = level.topology, level.topology.edges, len(level.topology.edges)
     level.measure(rings=True)
     _ = _sizes(level)
-    blocks = level.blocks.of_rows(EDGES_AT_ONCE)
     starts = np.concatenate([[0], np.cumsum(mesh.valence)]).astype(np.int64)
     leaving = np.empty(2 * count, dtype=np.uint32)
     kernels.find_leaving(edges, starts[:-1].copy(), leaving)
-    states = np.empty((2 * count, width), dtype=kind)
-    told = np.empty((mesh.vertex_count, 2 * networks.hidden), dtype=kind)
-
-    def both(begin: int, end: int) -> tuple[slice, slice]:
-        return slice(begin, end), slice(count + begin, count + end)
-
-    def encode(begin: int, end: int) -> None:
-        rows = checked_answers(networks.encoder, directed_features(level, begin, end, kind), width)
-        there, back = both(begin, end)
-        states[there], states[back] = rows[: end - begin], rows[end - begin :]
-
-    def tell(network: Network, begin: int, end: int) -> None:
-        pooled = np.empty((end - begin, 2 * width), dtype=kind)
-        kernels.pool(states, starts, leaving, begin, end, np.empty(width), pooled)
-        told[begin:end] = checked_answers(network, pooled, told.shape[1])
-
-    def hear(update: Network, begin: int, end: int) -> None:
-        messages = np.empty((2 * (end - begin), 2 * width + networks.hidden), dtype=kind)
-        kernels.gather(states, told, edges, begin, end, messages)
-        more, (there, back) = checked_answers(update, messages, width), both(begin, end)
-        # Both ways of an edge stand in one block: nobody else reads these rows any more.
-        states[there] += more[: end - begin]
-        states[back] += more[end - begin :]
-
+    states = _states(level, networks, starts, leaving)
     asked, of_leaving = np.empty((count, 3)), np.empty((2 * count, 3))
     logits, corner_logits = np.empty(count), np.empty(2 * count)
     heights = np.empty(2 * count if networks.answers > kernels.FACE else 0)
@@ -172,19 +147,14 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     of_edges = edges, mesh.half_edges, mesh.edge_class
 
     def answer(begin: int, end: int) -> None:
-        there, back = both(begin, end)
-        rows = np.concatenate([states[there], states[back]])
-        heads = checked_answers(networks.heads, rows, networks.answers).astype(np.float64)
+        rows = slice(2 * begin, 2 * end)
+        heads = checked_answers(networks.heads, states[rows], networks.answers).astype(np.float64)
         kernels.read_heads(*geometry, *of_edges, heads, begin, end, asked, of_leaving, logits)
         for own, column in (corner_logits, kernels.CORNER), (heights, kernels.FACE):
             if len(own):
-                own[there], own[back] = np.split(heads[:, column], 2)
+                own[rows] = heads[:, column]
 
-    blocks.run(count, encode)
-    for at_vertices, at_edges in networks.rounds:
-        blocks.quiet().run(mesh.vertex_count, partial(tell, at_vertices))
-        blocks.run(count, partial(hear, at_edges))
-    blocks.run(count, answer)
+    level.blocks.of_rows(EDGES_AT_ONCE).run(count, answer)
     of_vertices, vertex_logits = np.empty(level.points.shape), np.empty(mesh.vertex_count)
     read = of_leaving, corner_logits, starts, leaving
     level.blocks.quiet().run(
@@ -197,6 +167,40 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
         len(faces), lambda begin, end: kernels.mean_in_faces(*around, begin, end, faces)
     )
     return Answers(asked, of_vertices, faces, _sigmoid(logits), _sigmoid(vertex_logits))
+
+
+def _states(
+    level: Level,
+    networks: DirectedNetworks,
+    starts: Integer[np.ndarray, " V1"],
+    leaving: UInt32[np.ndarray, " D"],
+) -> Float[np.ndarray, "D W"]:
+    """Return the states of directed edges after all rounds."""
+    mesh, width, kind = level.topology, networks.width, networks.feature_type
+    edges, count, blocks = mesh.edges, len(mesh.edges), level.blocks.of_rows(EDGES_AT_ONCE)
+    states = np.empty((2 * count, width), dtype=kind)
+    told = np.empty((mesh.vertex_count, 2 * networks.hidden), dtype=kind)
+
+    def encode(begin: int, end: int) -> None:
+        rows = directed_features(level, begin, end, kind)
+        states[2 * begin : 2 * end] = checked_answers(networks.encoder, rows, width)
+
+    def tell(network: Network, begin: int, end: int) -> None:
+        pooled = np.empty((end - begin, 2 * width), dtype=kind)
+        kernels.pool(states, starts, leaving, begin, end, np.empty(width), pooled)
+        told[begin:end] = checked_answers(network, pooled, told.shape[1])
+
+    def hear(update: Network, begin: int, end: int) -> None:
+        messages = np.empty((2 * (end - begin), 2 * width + networks.hidden), dtype=kind)
+        kernels.gather(states, told, edges, begin, end, messages)
+        # Both ways of an edge stand in one block: nobody else reads these rows any more.
+        states[2 * begin : 2 * end] += checked_answers(update, messages, width)
+
+    blocks.run(count, encode)
+    for at_vertices, at_edges in networks.rounds:
+        blocks.quiet().run(mesh.vertex_count, partial(tell, at_vertices))
+        blocks.run(count, partial(hear, at_edges))
+    return states
 
 
 def checked_answers(network: Network, rows: Float[np.ndarray, "N K"], columns: int) -> np.ndarray:

@@ -255,8 +255,9 @@ def directed_level(level: Level, rule: DirectedRule) -> Additions:
 
         level.blocks.run(len(rows), correct)
     curves = find_curves(level.points, mesh.without_soft(), len(x))
-    along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-    made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
+    if len(curves.new_rows):
+        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
+        made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
     scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
     made.scale(scale)
     x += delta
@@ -270,25 +271,18 @@ def surroundings(
 ) -> Surroundings:
     """Return what surrounds the network's answers; ``base_points`` are x0."""
     mesh, seen, points = level.topology, level.unmarked, level.points
-    edge_count = len(mesh.edges)
-    flat = np.concatenate([points, (points[mesh.edges[:, 0]] + points[mesh.edges[:, 1]]) / 2])
-    faces = np.arange(mesh.face_count if level.base.polygons else 0)
-    in_faces = np.diff(mesh.offsets)[faces]
-    if len(faces):
-        centres = np.add.reduceat(points[mesh.corners], mesh.offsets[:-1]) / in_faces[:, None]
-        flat = np.concatenate([flat, centres])
-    flat -= base_points
+    flat = np.empty_like(base_points)
+    correction.place_flat(points, mesh.edges, mesh.edge_class, level.ringed, base_points, flat)
     lengths, squares = seen.edges.lengths, seen.rings.means[:, measures.SQUARE]
-    of_faces = np.zeros(0)
+    faces, of_faces = np.arange(mesh.face_count if level.base.polygons else 0), np.zeros(0)
     if len(faces):
+        in_faces, first = np.diff(mesh.offsets), len(points) + len(mesh.edges)
+        centres = np.add.reduceat(points[mesh.corners], mesh.offsets[:-1]) / in_faces[:, None]
+        flat[first:] = centres - base_points[first:]
         around = lengths[mesh.corner_edges] ** 2
         of_faces = np.add.reduceat(around, mesh.offsets[:-1]) / in_faces
     ringed = np.flatnonzero(level.ringed).astype(np.uint32)
     rows = ringed, mesh.interior, faces.astype(np.uint32)
-    at_rest = np.ones(len(flat), dtype=bool)
-    for first, moved in zip((0, len(points), len(points) + edge_count), rows, strict=True):
-        at_rest[first + moved] = False
-    flat[at_rest] = 0.0
     per_length = rule.budget / _unit_length(level)
     return Surroundings(
         flat,
@@ -312,15 +306,23 @@ def directed_gates(
     less open.
     """
     of_edges = (1 - sharpness) * np.tanh(rule.vertex_gate_sharpness * jumps)
-    opened, at_vertices = np.zeros(mesh.face_count), np.zeros(mesh.vertex_count)
-    most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
-    of_mesh = mesh.corners, mesh.offsets, mesh.corner_edges
-    directed.spread_gates(*of_mesh, of_edges, opened, at_vertices, most, least)
+    opened, at_vertices, most, least = spread_gates(mesh, of_edges)
     if len(mesh.vertex_sharpness):
         at_vertices *= 1 - np.minimum(mesh.vertex_sharpness, 1.0)  # corners that are named
     second = np.tanh(rule.gate_sharpness * jumps**2)
     bent = 1 - sharpness * (1 - most)
     return at_vertices, second * bent + (1 - second) * least, opened
+
+
+def spread_gates(
+    mesh: Topology, of_edges: Float[np.ndarray, " E"]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return what ``kernels.directed.spread_gates`` makes of the gates of edges."""
+    opened, at_vertices = np.zeros(mesh.face_count), np.zeros(mesh.vertex_count)
+    most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
+    of_mesh = mesh.corners, mesh.offsets, mesh.corner_edges
+    directed.spread_gates(*of_mesh, of_edges, opened, at_vertices, most, least)
+    return opened, at_vertices, most, least
 
 
 def along_normals(level: Level, heights: Float[np.ndarray, " F"]) -> Float[np.ndarray, "F 3"]:

@@ -82,7 +82,7 @@ class Level:
         """Make the measurements that several threads are about to read."""
         _ = self.normals, self.logs
         if rings:
-            _ = self.rings, self.ringed
+            _ = self.rings
 
     @cached_property
     def faces(self) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
@@ -135,20 +135,13 @@ class Level:
         return RingMeasures(fields, means, valence)
 
     @cached_property
-    def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
-        """True for vertices whose faces form more than one fan."""
-        return self.topology.multi_fans(self.blocks.quiet())
-
-    @cached_property
     def ringed(self) -> Bool[np.ndarray, " V"]:
         """Vertices with one closed ring of faces: those that a vertex rule may move.
 
         The end of one crease, a dart, is among them; a vertex on a boundary is not.
         """
         mesh = self.topology
-        used = np.zeros(mesh.vertex_count, dtype=bool)
-        used[mesh.corners] = True
-        ringed = used & ~self.multi_fan_vertices
+        ringed = mesh.count_fans(self.blocks.quiet()) == 1
         if len(mesh.sharp_count):
             creases = np.zeros(mesh.vertex_count, dtype=np.int32)
             connectivity.count_ends(mesh.edges, mesh.crease_edges, creases)

@@ -104,12 +104,22 @@ class Scheme:
 
 
 def loop() -> Scheme:
-    """Return the scheme of Loop subdivision (Loop 1987)."""
+    """Return the scheme of Loop subdivision (Loop 1987).
+
+    Example:
+        >>> loop().base.name
+        'loop'
+    """
     return Scheme("loop")
 
 
 def catmull_clark() -> Scheme:
-    """Return the scheme of Catmull–Clark subdivision (Catmull and Clark 1978)."""
+    """Return the scheme of Catmull–Clark subdivision (Catmull and Clark 1978).
+
+    Example:
+        >>> catmull_clark().base.polygons
+        True
+    """
     return Scheme("catmull-clark", CATMULL_CLARK)
 
 
@@ -137,6 +147,10 @@ def pns(model: Model, budget: float | None = None) -> Scheme:
     Raises:
         ParameterError: the budget is negative or not finite, or this is no model.
         ModelError: the card names a base scheme that is not known here.
+
+    Example:
+        >>> pns(load_model()).learned_levels
+        1
     """
     if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("model", type(model), expected="a model, as load_model() gives it")

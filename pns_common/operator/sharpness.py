@@ -22,7 +22,7 @@ from pns_common.mesh.mesh import Mesh, check_is_mesh
 from pns_common.model.file import load_model
 from pns_common.operator.curves import corner_shares, find_curves
 from pns_common.operator.directed import answers_of
-from pns_common.operator.formula import DirectedRule, directed_gates
+from pns_common.operator.formula import DirectedRule, spread_gates
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme, loop, pns
 from pns_common.parallel import Blocks
@@ -62,8 +62,7 @@ def shares_of_corners(level: Level, rule: DirectedRule) -> Float[np.ndarray, " V
     """
     answers, seen = answers_of(level, rule.networks), level.unmarked
     mesh = seen.topology
-    smooth = np.zeros(len(mesh.edges))
-    gate, _, _ = directed_gates(mesh, seen.edges.jumps, smooth, rule)
+    _, gate, *_ = spread_gates(mesh, np.tanh(rule.vertex_gate_sharpness * seen.edges.jumps))
     shares = np.minimum(clearly(gate * answers.corners), SHARPEST)
     counts = mesh.sharp_count
     if len(counts):
@@ -117,6 +116,11 @@ def sharp_edges(
     Raises:
         ParameterError: it is no Mesh, or the angle is out of range.
         ModelError: a network's answer is not finite, or has another shape.
+
+    Example:
+        >>> mesh = Mesh(np.eye(4, 3), [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> len(sharp_edges(mesh, angle=60))
+        6
     """
     check_is_mesh(mesh)
     if scheme is None:

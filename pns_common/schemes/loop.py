@@ -46,7 +46,7 @@ def _place_three(
 ) -> Float[np.ndarray, "W 3"]:
     count, edge_count = topology.vertex_count, len(topology.edges)
     placed = np.empty((count + edge_count, WIDTH))
-    read = points, topology.faces, topology.edges, topology.half_edges, topology.edge_class
+    read = points, topology.corners, topology.edges, topology.half_edges, topology.edge_class
     blocks.run(
         edge_count,
         lambda begin, end: kernels.place_edges(*read, topology.soft, begin, end, placed[count:]),

@@ -10,8 +10,7 @@ import io
 import stat
 import zipfile
 import zlib
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 
 from ..errors import ServiceError, UnreadableError, check_limit
 from .media import is_apple_double
@@ -47,6 +46,18 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         ArchiveError: not one document; a name that leads out of the archive, a link, encryption.
         LimitError: too many entries, or too much in them.
     """
+    unpacker = unpacker_of(data, max_bytes)
+    documents = [name for name in unpacker.entries if name.lower().endswith(_DOCUMENTS)]
+    if len(documents) != 1:
+        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
+    main = documents[0]
+    folder = main.rpartition("/")[0]
+    siblings = SiblingFiles(unpacker.find, frozenset(unpacker.entries) - {main}, folder)
+    return unpacker.read(main), siblings
+
+
+def unpacker_of(data: bytes, max_bytes: int = 0) -> Unpacker:
+    """Open any .zip, of which `max_bytes` at most are unpacked; errors are `open_archive`'s."""
     # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
     count = data.count(_INDEX_ENTRY)
     check_limit("archive-entries", count, MAX_ENTRIES, f"the archive has {count} entries")
@@ -54,19 +65,8 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
         opened = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
         raise UnreadableError(f"the archive cannot be read: {error}") from error
-    entries = _entries(opened)
-    documents = [name for name in entries if name.lower().endswith(_DOCUMENTS)]
-    if len(documents) != 1:
-        raise ArchiveError(f"the archive holds {len(documents)} glTF files")
-    main = documents[0]
-    folder = main.rpartition("/")[0]
-    unpacker = _Unpacker(opened, entries, len(data), max_bytes)
-    siblings = SiblingFiles(partial(_find, unpacker), frozenset(entries) - {main}, folder)
-    return unpacker.read(main), siblings
-
-
-def _find(unpacker: _Unpacker, name: str) -> File | None:
-    return unpacker.read(name) if name in unpacker.entries else None
+    allowed = min(max_bytes, max(RATIO_FLOOR, MAX_RATIO * len(data)))
+    return Unpacker(opened, _entries(opened), allowed)
 
 
 def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -97,23 +97,27 @@ def _entries(opened: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
 
 
 @dataclass
-class _Unpacker:
+class Unpacker:
+    """The files of an archive by name, and how many bytes of them may be unpacked."""
+
     opened: zipfile.ZipFile
     entries: dict[str, zipfile.ZipInfo]
-    packed: int
-    max_bytes: int
-    unpacked: int = field(default=0)
+    allowed: int
+    unpacked: int = 0
+
+    def find(self, name: str) -> File | None:
+        """Unpack the file of that name; None where there is none."""
+        return self.read(name) if name in self.entries else None
 
     def read(self, name: str) -> File:
         """Unpack one file piece by piece, until it ends or a limit does."""
         pieces: list[bytes] = []
-        allowed = min(self.max_bytes, max(RATIO_FLOOR, MAX_RATIO * self.packed))
         try:
             with self.opened.open(self.entries[name]) as file:
                 while piece := file.read(_PIECE):
                     self.unpacked += len(piece)
                     text = f"the archive unpacks to {self.unpacked} bytes or more"
-                    check_limit("archive-bytes", self.unpacked, allowed, text)
+                    check_limit("archive-bytes", self.unpacked, self.allowed, text)
                     pieces.append(piece)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, ValueError) as error:
             raise UnreadableError(f"the archive cannot be read: {error}") from error

@@ -16,12 +16,12 @@ MIXED = "multipart/mixed"
 ZIP = "application/zip"
 
 # As their names end.
-Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off"]
+Kind = Literal["glb", "gltf", "obj", "ply", "stl", "off", "3mf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 GLTF_KINDS = ("glb", "gltf")
 # Other endings of the same kinds: a VRM is a GLB.
 ALIASES: dict[str, Kind] = {"vrm": "glb"}
-# The pipeline's name of each file type. Only OBJ's and STL's beside glTF's are registered.
+# The pipeline's name of each file type. OBJ's, STL's and 3MF's beside glTF's are registered.
 FORMATS: dict[str, Kind] = {
     GLB: "glb",
     GLTF: "gltf",
@@ -29,6 +29,7 @@ FORMATS: dict[str, Kind] = {
     "model/ply": "ply",
     "model/stl": "stl",
     "model/off": "off",
+    "model/3mf": "3mf",
 }
 MEDIA_TYPES: dict[Kind, str] = {kind: media for media, kind in FORMATS.items()}
 # Any glTF, or an archive of one, told by its first bytes: generated clients send no other type.
@@ -39,7 +40,6 @@ _WEIGHT = re.compile(r"q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)")
 
 GLB_MAGIC = b"glTF"
 ZIP_MAGIC = b"PK\x03\x04"
-BLANK = b" \t\r\n"
 IDENTITY, GZIP = "identity", "gzip"
 # zlib's number for a gzip header and its checksum.
 _GZIP_BITS = 31
@@ -92,7 +92,7 @@ def sniff(data: bytes) -> str:
 def begins_as_json(data: bytes) -> bool:
     """Return whether a file begins as a JSON object does."""
     # A slice: a file of nothing but blanks is not to be copied to find that out.
-    return data[:4096].lstrip(b"\xef\xbb\xbf" + BLANK).startswith(b"{")
+    return data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def kind_of(name: str) -> Kind | None:
@@ -100,12 +100,6 @@ def kind_of(name: str) -> Kind | None:
     ending = name.rpartition("/")[2].rpartition(".")[2].lower()
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
     return (kinds | ALIASES).get(ending)
-
-
-def mesh_kind_of(name: str) -> Kind | None:
-    """Tell by a file name's extension what the first bytes would not tell: no glTF."""
-    kind = kind_of(name)
-    return None if kind in GLTF_KINDS else kind
 
 
 def encoding_of(header: str) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from unicodedata import normalize
 from urllib.parse import unquote
@@ -60,7 +59,9 @@ class Opened:
         if name is None:
             return None
         if name not in self.files:
-            found = (self.siblings.find(spelling) for spelling in _spellings(name))
+            # With its accents as they are, composed, and apart, as macOS packs archives.
+            spellings = dict.fromkeys((name, normalize("NFC", name), normalize("NFD", name)))
+            found = (self.siblings.find(spelling) for spelling in spellings)
             self.files[name] = next((file for file in found if file is not None), None)
         file = self.files[name]
         self.size += 0 if file is None else len(file.content)
@@ -104,11 +105,6 @@ def safe_name(uri: str, folder: str = "") -> str | None:
     return relative_name("/".join(steps))
 
 
-def _spellings(name: str) -> Iterable[str]:
-    """Return a name with its accents as they are, composed, and apart, as macOS packs archives."""
-    return dict.fromkeys((name, *(normalize(form, name) for form in ("NFC", "NFD"))))
-
-
 def relative_name(path: str) -> str | None:
     """Return a relative path's shortest form; None if it could lead out of its folder."""
     if path.startswith("/") or "\\" in path or any(ord(letter) < 32 for letter in path):
@@ -121,15 +117,16 @@ def relative_name(path: str) -> str | None:
 
 def folder_of(document: Path) -> SiblingFiles:
     """Return what lies beside a file; links that lead out of its folder are not followed."""
-    return SiblingFiles(partial(_find, document.parent.resolve()))
+    folder = document.parent.resolve()
 
-
-def _find(folder: Path, name: str) -> File | None:
-    try:
-        path = (folder / name).resolve()
-        if not path.is_relative_to(folder) or not path.is_file():
+    def find(name: str) -> File | None:
+        try:
+            path = (folder / name).resolve()
+            if not path.is_relative_to(folder) or not path.is_file():
+                return None
+        except OSError:
+            # A name that no file can have, such as a very long one.
             return None
-    except OSError:
-        # A name that no file can have, such as a very long one.
-        return None
-    return File(name, path.read_bytes())
+        return File(name, path.read_bytes())
+
+    return SiblingFiles(find)

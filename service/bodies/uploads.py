@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 
 from python_multipart import FormParser
 from python_multipart.exceptions import FormParserError
@@ -45,34 +45,25 @@ def sent(body: bytes, content_type: str, limits: Limits) -> Sent:
         ServiceError: the body is not what its content type says, or over a limit.
     """
     media_type = media.of_request(content_type)
-    if media_type in media.FORMATS:
-        return Sent(body, media.FORMATS[media_type])
-    if media_type == media.BYTES:
-        media_type = media.sniff(body)
-        if media_type != media.ZIP:
-            return Sent(body, media.FORMATS[media_type])
-    if media_type == media.ZIP:
-        return _unpacked(body, limits)
-    files = sent_files(body, content_type)
-    content = bytes(files.main.content)
-    kind = media.mesh_kind_of(files.main.name)
+    data, kind, siblings = body, media.FORMATS.get(media_type), ALONE
+    if media_type == media.MULTIPART:
+        main, siblings = sent_files(body, content_type)
+        data, named = bytes(main.content), media.kind_of(main.name)
+        # A glTF is told by its first bytes.
+        kind = None if named in media.GLTF_KINDS else named
     if kind is not None:
-        return Sent(content, kind, files.siblings)
-    media_type = media.sniff(content)
+        return Sent(data, kind, siblings)
+    if media_type != media.ZIP:
+        media_type = media.sniff(data)
     if media_type == media.ZIP:
-        if files.siblings.names:
+        if siblings.names:
             raise MediaTypeError("an archive comes alone: the files beside it belong into it")
-        return _unpacked(content, limits)
-    return Sent(content, media.FORMATS[media_type], files.siblings)
-
-
-def _unpacked(data: bytes, limits: Limits) -> Sent:
-    main, siblings = open_archive(data, limits.max_memory_bytes // BYTES_PER_INPUT_BYTE)
-    content = bytes(main.content)
-    media_type = media.sniff(content)
-    if media_type == media.ZIP:
-        raise MediaTypeError("the archive's glTF is an archive")
-    return Sent(content, media.FORMATS[media_type], siblings)
+        main, siblings = open_archive(data, limits.max_memory_bytes // BYTES_PER_INPUT_BYTE)
+        data = bytes(main.content)
+        media_type = media.sniff(data)
+        if media_type == media.ZIP:
+            raise MediaTypeError("the archive's glTF is an archive")
+    return Sent(data, media.FORMATS[media_type], siblings)
 
 
 @dataclass(frozen=True)
@@ -82,16 +73,8 @@ class _Part:
     content: bytes
 
 
-@dataclass(frozen=True)
-class SentFiles:
-    """The one part named `file`, called as its sender's file is, and the other parts beside it."""
-
-    main: File
-    siblings: SiblingFiles
-
-
-def sent_files(body: bytes, content_type: str) -> SentFiles:
-    """Return the files of a form.
+def sent_files(body: bytes, content_type: str) -> tuple[File, SiblingFiles]:
+    """Return the one part named `file`, called as its sender's file is, and those beside it.
 
     A neighbour is called by its part's name, or else by its file name: form clients strip folders
     from the latter.
@@ -105,8 +88,8 @@ def sent_files(body: bytes, content_type: str) -> SentFiles:
     main = [part for part in parts if part.name == MAIN]
     if len(main) != 1:
         raise MultipartError(f"{len(main)} parts have the name {MAIN}, not one")
-    others = [part for part in parts if part.name != MAIN]
-    return SentFiles(File(main[0].filename, main[0].content), _siblings(others))
+    siblings = _siblings(part for part in parts if part.name != MAIN)
+    return File(main[0].filename, main[0].content), siblings
 
 
 def _parsed(body: bytes, content_type: str) -> list[_Part]:
@@ -115,7 +98,20 @@ def _parsed(body: bytes, content_type: str) -> list[_Part]:
         raise UnreadableError("the Content-Type names no multipart boundary")
     parts: list[_Part] = []
     ends: list[bool] = []
-    take = partial(_take, parts)
+
+    def take(sent: Field | SentFile) -> None:
+        count = len(parts) + 1
+        check_limit("parts", count, MAX_PARTS, f"the body has {count} parts or more")
+        name = (sent.field_name or b"").decode(errors="replace")
+        if not name:
+            raise MultipartError("a part has no name")
+        if isinstance(sent, Field):
+            parts.append(_Part(name, "", sent.value or b""))
+        else:
+            filename = (sent.file_name or b"").decode(errors="replace")
+            sent.file_object.seek(0)
+            parts.append(_Part(name, filename, sent.file_object.read()))
+
     try:
         # Its own limits bound the headers of a part.
         parser = FormParser(
@@ -135,21 +131,7 @@ def _parsed(body: bytes, content_type: str) -> list[_Part]:
     return parts
 
 
-def _take(parts: list[_Part], sent: Field | SentFile) -> None:
-    count = len(parts) + 1
-    check_limit("parts", count, MAX_PARTS, f"the body has {count} parts or more")
-    name = (sent.field_name or b"").decode(errors="replace")
-    if not name:
-        raise MultipartError("a part has no name")
-    if isinstance(sent, Field):
-        parts.append(_Part(name, "", sent.value or b""))
-    else:
-        filename = (sent.file_name or b"").decode(errors="replace")
-        sent.file_object.seek(0)
-        parts.append(_Part(name, filename, sent.file_object.read()))
-
-
-def _siblings(parts: list[_Part]) -> SiblingFiles:
+def _siblings(parts: Iterable[_Part]) -> SiblingFiles:
     by_name: dict[str, File] = {}
     by_filename: defaultdict[str, list[File]] = defaultdict(list)
     for part in parts:

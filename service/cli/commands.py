@@ -30,7 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Proximity-Preserving Neural Subdivision of glTF, OBJ, PLY, STL and OFF files.",
+    help="Proximity-Preserving Neural Subdivision of glTF, OBJ, PLY, STL, OFF and 3MF files.",
 )
 
 
@@ -134,7 +134,7 @@ def batch(
     context: typer.Context,
     source: Annotated[
         str,
-        typer.Argument(help="folder, glob or manifest (.txt, .csv, .jsonl, .parquet); path or URL"),
+        typer.Argument(help="folder, glob or file; path or URL"),
     ],
     dest: Annotated[str, typer.Argument(help="folder for the results; path or URL")],
     model: ModelOption = None,
@@ -144,9 +144,9 @@ def batch(
     engine: EngineOption = "local",
     address: AddressOption = None,
     workers: WorkersOption = None,
-    report: Annotated[
-        Path, typer.Option(metavar="FILE", help="rows of all files: .parquet or .jsonl")
-    ] = Path("pns-batch.jsonl"),
+    report: Annotated[Path, typer.Option(metavar="FILE", help="rows of all files: .jsonl")] = Path(
+        "pns-batch.jsonl"
+    ),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="say what would be done; write no result")
     ] = False,

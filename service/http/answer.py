@@ -7,13 +7,13 @@ import json
 import logging
 import secrets
 from collections.abc import AsyncGenerator, Coroutine
-from contextlib import AbstractContextManager, AsyncExitStack, aclosing
+from contextlib import AsyncExitStack, aclosing
 from typing import Any, TypeVar
 
 from fastapi import Request
 from starlette.requests import ClientDisconnect
-from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
+from starlette.responses import StreamingResponse
+from starlette.types import Message, Receive, Scope, Send
 
 from ..bodies import media
 from ..errors import ServiceError
@@ -31,7 +31,7 @@ LOOK_SECONDS = 0.25
 SILENT_SECONDS = 5.0
 
 
-class _Answer(Response):
+class Answer(StreamingResponse):
     """Sends pieces, and then lets go of what is held for them.
 
     A client that takes too long for a piece is cut off, and one whose place another needs. One that
@@ -43,160 +43,117 @@ class _Answer(Response):
         service: Service,
         job: Job,
         held: AsyncExitStack,
+        pieces: AsyncGenerator[bytes],
         media_type: str,
         headers: dict[str, str],
     ) -> None:
-        super().__init__(media_type=media_type, headers=headers | {"Vary": "Accept"})
-        # Of a body that is not known yet, Starlette has said that it is empty.
-        if "Content-Length" not in headers:
-            del self.headers["Content-Length"]
-        self._service, self._job = service, job
-        self._held = held
-        self._end = asyncio.timeout(None)
-
-    def pieces(self, scope: Scope, receive: Receive) -> AsyncGenerator[bytes]:
-        """Yield the body."""
-        raise NotImplementedError
-
-    def _taking(self) -> AbstractContextManager[None]:
-        return self._service.places.taking(self._job.client.id, self._end)
+        super().__init__(pieces, media_type=media_type, headers=headers | {"Vary": "Accept"})
+        self._pieces = pieces
+        self._stall_seconds = service.settings.stall_seconds
+        self._end, self._held = job.end, held
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the answer."""
         async with self._held:
-            await send(
-                {
-                    "type": "http.response.start",
-                    "status": self.status_code,
-                    "headers": self.raw_headers,
-                }
-            )
             try:
-                async with self._end, aclosing(self.pieces(scope, receive)) as pieces:
-                    async for piece in pieces:
-                        # To one who is gone `send` returns at once: others are to have a turn.
-                        await asyncio.sleep(0)
-                        async with asyncio.timeout(self._service.settings.stall_seconds):
-                            await send(
-                                {"type": "http.response.body", "body": piece, "more_body": True}
-                            )
+                async with self._end:
+                    await unless_gone(receive, self._sent(send))
             except ClientDisconnect:
                 return
             except TimeoutError:
                 why = "its place is needed" if self._end.expired() else "its client is too slow"
                 log.warning("an answer is cut off: %s", why)
-                return
-            await send({"type": "http.response.body", "body": b""})
+
+    async def _sent(self, send: Send) -> None:
+        async def in_time(message: Message) -> None:
+            # To one who is gone `send` returns at once: others are to have a turn.
+            await asyncio.sleep(0)
+            async with asyncio.timeout(self._stall_seconds):
+                await send(message)
+
+        async with aclosing(self._pieces):
+            await self.stream_response(in_time)
 
 
-class FileAnswer(_Answer):
-    """Sends a memory file."""
+def file_answer(
+    service: Service, job: Job, held: AsyncExitStack, media_type: str, content: MemoryFile
+) -> Answer:
+    """Answer with a memory file."""
 
-    def __init__(
-        self, service: Service, job: Job, held: AsyncExitStack, media_type: str, content: MemoryFile
-    ) -> None:
-        headers = {
-            "Content-Length": str(content.size),
-            "Server-Timing": server_timing(job.seconds),
-        }
-        super().__init__(service, job, held, media_type, headers)
-        self._content = content
+    async def pieces() -> AsyncGenerator[bytes]:
+        with service.places.taking(job.client.id, job.end):
+            for piece in content.pieces():
+                yield piece
 
-    async def pieces(self, scope: Scope, receive: Receive) -> AsyncGenerator[bytes]:
-        """Yield the file. Raises ClientDisconnect once its client has left."""
-        gone = asyncio.create_task(_until_gone(receive))
-        try:
-            with self._taking():
-                for piece in self._content.pieces():
-                    yield piece
-                    if gone.done():
-                        raise ClientDisconnect
-        finally:
-            gone.cancel()
+    headers = {"Content-Length": str(content.size), "Server-Timing": server_timing(job.seconds)}
+    return Answer(service, job, held, pieces(), media_type, headers)
 
 
-class StreamAnswer(_Answer):
-    """Does a job and sends how far it is, at least every five seconds; then the file and report.
+def stream_answer(
+    service: Service, job: Job, held: AsyncExitStack, file_type: str, request: Request
+) -> Answer:
+    """Do a job and answer with its progress, at least every five seconds; then file and report.
 
     Or, in their place, the problem. Each part says what it is by `Content-Description`. Only a
     stream that ends with the closing boundary is whole.
     """
+    boundary = secrets.token_hex(16)
+    # It follows each part at once: so its reader knows that it is whole.
+    end = f"\r\n--{boundary}".encode()
 
-    def __init__(self, service: Service, job: Job, held: AsyncExitStack, file_type: str) -> None:
-        self._boundary = secrets.token_hex(16)
-        super().__init__(
-            service,
-            job,
-            held,
-            f"{media.MIXED}; boundary={self._boundary}",
-            # A proxy that collects the stream (nginx) would keep it until its end.
-            {"Cache-Control": "no-store", "X-Accel-Buffering": "no"},
-        )
-        self._file_type = file_type
-
-    async def pieces(self, scope: Scope, receive: Receive) -> AsyncGenerator[bytes]:
-        """Yield the parts. Raises ClientDisconnect once its client has left."""
-        job = self._job
-        work = asyncio.create_task(self._service.serve(job))
-        gone = asyncio.create_task(_until_gone(receive))
-        # A boundary follows each part at once: so its reader knows that it is whole.
-        end = f"\r\n--{self._boundary}".encode()
+    async def parts() -> AsyncGenerator[bytes]:
+        work = asyncio.create_task(service.serve(job))
         try:
             yield end[2:]
             said, silent = b"", 0.0
             while not work.done():
-                now = self._progress()
+                now = _progress(service, job)
                 if now != said or silent >= SILENT_SECONDS:
                     said, silent = now, 0.0
-                    yield self._head("progress", media.JSON) + now + end
-                await asyncio.wait(
-                    {work, gone}, timeout=LOOK_SECONDS, return_when=asyncio.FIRST_COMPLETED
-                )
+                    yield _head("progress", media.JSON) + now + end
+                await asyncio.wait({work}, timeout=LOOK_SECONDS)
                 silent += LOOK_SECONDS
-                if gone.done():
-                    raise ClientDisconnect
             try:
                 work.result()
             except (ServiceError, JobFaultError) as error:
                 document = problems.of_failure(error)
                 # For the journal.
-                scope["state"]["problem"] = document.code
-                yield self._head("problem", problems.MEDIA_TYPE) + bytes(document.body) + end
+                request.state.problem = document.code
+                yield _head("problem", problems.MEDIA_TYPE) + bytes(document.body) + end
             else:
                 timing = f"Server-Timing: {server_timing(job.seconds)}"
-                with self._taking():
-                    for name, kind, file in (
-                        ("file", self._file_type, job.answer),
-                        ("report", media.JSON, job.report),
-                    ):
-                        yield self._head(name, kind, f"Content-Length: {file.size}", timing)
+                files = ("file", file_type, job.answer), ("report", media.JSON, job.report)
+                with service.places.taking(job.client.id, job.end):
+                    for name, kind, file in files:
+                        yield _head(name, kind, f"Content-Length: {file.size}", timing)
                         for piece in file.pieces():
                             yield piece
-                            if gone.done():
-                                raise ClientDisconnect
                         yield end
             yield b"--\r\n"
         finally:
-            gone.cancel()
             work.cancel()
-            await asyncio.gather(work, gone, return_exceptions=True)
+            await asyncio.gather(work, return_exceptions=True)
 
-    def _head(self, name: str, kind: str, *more: str) -> bytes:
-        headers = f"Content-Type: {kind}", f"Content-Description: {name}", *more
-        return "\r\n".join(("", *headers, "", "")).encode()
+    # A proxy that collects the stream (nginx) would keep it until its end.
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    return Answer(service, job, held, parts(), f"{media.MIXED}; boundary={boundary}", headers)
 
-    def _progress(self) -> bytes:
-        turn, page = self._job.turn, self._job.page
-        waits = turn is None or turn.began is None
-        return json.dumps(
-            {
-                "state": "queued" if waits else "running",
-                "place": self._service.workers.place(turn) if waits else None,
-                "stage": page.stage,
-                "share": round(page.share, 4),
-            },
-            separators=(",", ":"),
-        ).encode()
+
+def _head(name: str, kind: str, *more: str) -> bytes:
+    """Return the head of a part."""
+    headers = f"Content-Type: {kind}", f"Content-Description: {name}", *more
+    return "\r\n".join(("", *headers, "", "")).encode()
+
+
+def _progress(service: Service, job: Job) -> bytes:
+    page = None if job.turn is None else job.turn.progress
+    told = {
+        "state": "queued" if page is None else "running",
+        "place": service.workers.place(job.turn) if page is None else None,
+        "stage": None if page is None else page.stage,
+        "share": 0.0 if page is None else round(page.share, 4),
+    }
+    return json.dumps(told, separators=(",", ":")).encode()
 
 
 async def unless_gone(receive: Receive, work: Coroutine[Any, Any, T]) -> T:

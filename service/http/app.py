@@ -94,7 +94,7 @@ def create_app(
                 told.cancel()
             await workers.stop()
 
-    app = _Layered(
+    app = FastAPI(
         title="PNS",
         summary="Subdivision surfaces with a small, bounded, learned correction",
         version=version("pns-subdivision"),
@@ -111,14 +111,17 @@ def create_app(
             logs=False,
             operation_spans=False,
         ),
-        generate_unique_id_function=openapi.operation_id,
+        # The name of the function is the clients' name of an operation, too.
+        generate_unique_id_function=lambda route: route.name,
+        exception_handlers=problems.HANDLERS,
     )
     # Whoever names a route puts this before it; requests come without it.
     app.root_path = settings.prefix
-    app.layers = lambda routes: around(routes, settings, metrics, keys)
+    # Around everything, the handler of last resort too.
+    stack = app.build_middleware_stack
+    app.build_middleware_stack = lambda: around(stack(), settings, metrics, keys)  # type: ignore[method-assign]
     app.state.metrics = metrics
     app.state.service = service
-    problems.install(app)
     routers = [routes.router(service), pages.router(settings.prefix)]
     for router in routers:
         app.include_router(router)
@@ -140,8 +143,8 @@ def around(
     """
     app = routes
     if keys is not None:
-        app = Bearer(app, keys)
-    app = Origins(app, settings)
+        app = problems.Checked(app, Bearer(keys).check)
+    app = problems.Checked(app, Origins(settings).check)
     if settings.cors_origins:
         app = CORSMiddleware(
             app,
@@ -165,12 +168,3 @@ async def _tell_when_ready(service: Service) -> None:
     log.info("ready: a worker has loaded the model")
     with suppress(ServiceError):
         await service.catalogue()
-
-
-class _Layered(FastAPI):
-    """An application whose layers are outside of everything, its handler of last resort too."""
-
-    layers: Callable[[ASGIApp], ASGIApp]
-
-    def build_middleware_stack(self) -> ASGIApp:
-        return self.layers(super().build_middleware_stack())

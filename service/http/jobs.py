@@ -26,7 +26,6 @@ from ..workers.jobs import Done, Work
 from ..workers.memory_file import MemoryFile
 from ..workers.models import Catalogue
 from ..workers.pool import Turn, Workers
-from ..workers.progress import ProgressPage
 from .access.clients import Client, FacesBudget, Places, client_of
 from .parameters import Parameters
 
@@ -45,16 +44,16 @@ class UploadTimeoutError(ServiceError):
 class Job:
     """A job: what its worker is told and fills, and when it came and began.
 
-    One of `answer` and `report` may stay empty, where nobody wants it.
+    One of `answer` and `report` may stay empty, where nobody wants it. `end` cuts its answer off.
     """
 
     client: Client
     work: Work
     answer: MemoryFile
     report: MemoryFile
-    page: ProgressPage
     upload_seconds: float
     admitted: float = field(default_factory=time.monotonic)
+    end: asyncio.Timeout = field(default_factory=lambda: asyncio.timeout(None))
     turn: Turn | None = None
     done: Done | None = None
 
@@ -134,14 +133,12 @@ class Service:
             began = time.monotonic()
             body = held.enter_context(MemoryFile())
             await self._receive(request, body)
-            page = held.enter_context(ProgressPage())
             answer_file = held.enter_context(MemoryFile())
             report_file = held.enter_context(MemoryFile())
             work = Work(
                 body=body.name,
                 answer=answer_file.name if answer else None,
                 report=report_file.name if report else None,
-                page=page.file.name,
                 content_type=content_type,
                 options=options,
                 model=parameters.model,
@@ -152,7 +149,7 @@ class Service:
                 body_bytes=int(settings.body),
             )
             upload_seconds = time.monotonic() - began
-            yield Job(client, work, answer_file, report_file, page, upload_seconds)
+            yield Job(client, work, answer_file, report_file, upload_seconds)
 
     async def _receive(self, request: Request, body: MemoryFile) -> None:
         """Take a body in, piece by piece. Raises LimitError, UploadTimeoutError, NoStorageError."""
@@ -183,7 +180,7 @@ class Service:
         """
         job.turn = self.workers.join(job.client.id)
         try:
-            job.done = await self.workers.run(job.turn, self._run, job.work, stop=job.page.stop)
+            job.done = await self.workers.run(job.turn, self._run, job.work)
             self._budget.charge(job.client, job.done.faces)
             options, model = job.work.options, job.done.model
             what = options.scheme if model is None else f"{options.scheme} ({model})"

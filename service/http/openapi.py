@@ -10,7 +10,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Literal
 
-from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 
 from ..bodies import media
@@ -61,20 +60,25 @@ def _named(schema: str) -> dict[str, str]:
     return {"$ref": f"#/components/schemas/{schema}"}
 
 
-def _json(schema: str) -> dict[str, Any]:
-    return {"content": {media.JSON: {"schema": _named(schema)}}}
+# What an answer of each status says, whichever route gives it.
+_REASONS = {
+    400: "The body cannot be read",
+    401: "A key is needed, or the one sent is not known",
+    403: "A page of another origin asks, and is not named",
+    408: "The body took too long to arrive",
+    413: "Over a limit: body, predicted faces, levels or memory",
+    415: "A content type that is not taken",
+    422: "A bad parameter, a file that breaks its promises, or a mesh not to be refined",
+    429: "The client has too many requests under way, or its budget of faces is used up",
+    500: "A fault of the service",
+    503: "Busy, too many connections, the worker died, or without a model",
+    504: "The job took too long",
+}
 
 
-def problem(reason: str) -> dict[str, Any]:
-    """Return the description of an answer that is a problem."""
-    return {
-        "description": reason,
-        "content": {problems.MEDIA_TYPE: {"schema": _named("Problem")}},
-    }
-
-
-def _problems(**reasons: str) -> dict[int | str, dict[str, Any]]:
-    return {int(status[1:]): problem(reason) for status, reason in reasons.items()}
+def _problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    content = {problems.MEDIA_TYPE: {"schema": _named("Problem")}}
+    return {each: {"description": _REASONS[each], "content": content} for each in statuses}
 
 
 _SERVER_TIMING = {
@@ -102,25 +106,14 @@ SUBDIVIDE: dict[str, Any] = {
         "Answers with the refined GLB, whose `asset.extras.pns` holds the report; with "
         "`Accept: application/json`, as `POST /report` does; with `Accept: multipart/mixed`, with "
         "a stream of how far it is, and then both. "
-        "Materials, textures, nodes and names stay. OBJ, PLY, STL and OFF come as their media "
+        "Materials, textures, nodes and names stay. OBJ, PLY, STL, OFF and 3MF come as their media "
         "type, or in a form under a file name with their extension; what they hold that a GLB of "
         "plain triangles does not is named in the report's `changes`."
     ),
     "openapi_extra": {"requestBody": _BODY},
     "responses": {
         200: _FILE,
-        **_problems(
-            _400="The body cannot be read",
-            _408="The body took too long to arrive",
-            _413="Over a limit: body, predicted faces, levels or memory",
-            _429="The client has too many requests under way, or its budget of faces is used up "
-            "(see Retry-After)",
-            _415="A content type that is not taken",
-            _422="A bad parameter, a file that breaks its promises, or a mesh not to be refined",
-            _500="A fault of the service",
-            _503="Busy, the worker died (see Retry-After), or without a model",
-            _504="The job took too long",
-        ),
+        **_problems(400, 408, 413, 415, 422, 500, 504),
     },
 }
 
@@ -128,7 +121,13 @@ REPORT: dict[str, Any] = SUBDIVIDE | {
     "summary": "The report of a refinement, without its file",
     "description": "Parameters and bodies are those of `POST /subdivide`.",
     "responses": SUBDIVIDE["responses"]
-    | {200: {"description": "The report", "headers": _SERVER_TIMING, **_json("Report")}},
+    | {
+        200: {
+            "description": "The report",
+            "headers": _SERVER_TIMING,
+            "content": {media.JSON: {"schema": _named("Report")}},
+        }
+    },
 }
 
 MODELS: dict[str, Any] = {
@@ -140,10 +139,7 @@ MODELS: dict[str, Any] = {
     "responses": {
         200: {"headers": {"ETag": {"schema": {"type": "string"}}}},
         304: {"description": "The client has this list"},
-        **_problems(
-            _500="A fault of the service",
-            _503="Busy (see Retry-After)",
-        ),
+        **_problems(500),
     },
 }
 
@@ -158,25 +154,12 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     },
 }
 
-LIMITS: dict[str, Any] = {"summary": "What a request may ask for"}
-
-HEALTHZ: dict[str, Any] = {"tags": ["probes"], "summary": "Whether the process answers"}
-
+PROBES = "probes"
 READYZ: dict[str, Any] = {
-    "tags": ["probes"],
+    "tags": [PROBES],
     "summary": "Whether a worker has the model",
-    "responses": _problems(_503="Without a model"),
+    "responses": _problems(503),
 }
-
-# What every route may answer, whatever it is asked; the rest is with the routes.
-EVERYWHERE = {
-    "401": "A key is needed, or the one sent is not known",
-    "429": "Too much was asked for (see Retry-After)",
-    "503": "Too many connections (see Retry-After)",
-}
-# And where it is asked for work.
-ASKED_FOR_WORK = {"403": "A page of another origin asks, and is not named"}
-OPEN_TAG = "probes"
 
 _REQUEST_ID = {
     "X-Request-ID": {
@@ -191,43 +174,39 @@ _RETRY_AFTER = {
     }
 }
 _CHALLENGE = {"WWW-Authenticate": {"schema": {"type": "string"}}}
+_KEY = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "needed where the service has keys",
+}
 # Beside those of a route's own.
 HEADERS = {"401": _CHALLENGE, "429": _RETRY_AFTER, "503": _RETRY_AFTER}
 
 
-def operation_id(route: APIRoute) -> str:
-    """Return the name of the function: it is the clients' name of it, too."""
-    return route.name
-
-
 def described(make: Callable[[], dict[str, Any]]) -> Callable[[], dict[str, Any]]:
     """Return what makes the document, once: FastAPI calls it for /openapi.json."""
-    return cache(lambda: _described(make()))
 
+    @cache
+    def document() -> dict[str, Any]:
+        made = make()
+        components = made.setdefault("components", {})
+        components["securitySchemes"] = {"key": _KEY}
+        components.setdefault("schemas", {}).update(SCHEMAS)
+        for operations in made["paths"].values():
+            for method, operation in operations.items():
+                _complete(operation, asks_for_work=method == "post")
+        return made
 
-def _described(document: dict[str, Any]) -> dict[str, Any]:
-    components = document.setdefault("components", {})
-    schemas = components.setdefault("schemas", {})
-    schemas |= SCHEMAS
-    for operations in document["paths"].values():
-        for method, operation in operations.items():
-            responses = operation["responses"]
-            if OPEN_TAG not in operation.get("tags", ()):
-                also = {} if method == "get" else ASKED_FOR_WORK
-                for status, text in (EVERYWHERE | also).items():
-                    responses.setdefault(status, problem(text))
-                operation["security"] = [{}, {"key": []}]
-            else:
-                # Nobody needs a key.
-                operation["security"] = []
-            for status, answer in responses.items():
-                own = answer.get("headers", {})
-                answer["headers"] = own | HEADERS.get(status, {}) | _REQUEST_ID
-    components["securitySchemes"] = {
-        "key": {
-            "type": "http",
-            "scheme": "bearer",
-            "description": "needed where the service has keys",
-        }
-    }
     return document
+
+
+def _complete(operation: dict[str, Any], *, asks_for_work: bool) -> None:
+    """Say of an operation what every route may answer, and whether a key is needed."""
+    responses, is_probe = operation["responses"], PROBES in operation.get("tags", ())
+    operation["security"] = [] if is_probe else [{}, {"key": []}]
+    if not is_probe:
+        also = _problems(401, 429, 503, *([403] if asks_for_work else []))
+        operation["responses"] = responses = {str(each): also[each] for each in also} | responses
+    for status, answer in responses.items():
+        own = answer.get("headers", {})
+        answer["headers"] = own | HEADERS.get(status, {}) | _REQUEST_ID

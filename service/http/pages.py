@@ -54,31 +54,38 @@ def router(prefix: str = "") -> APIRouter:
     Under a `prefix` the page names its assets from the root of the host: a browser that asked for
     the prefix without a slash at its end would look for them a folder too high.
     """
+    # Names are looked up here, never joined to a path of the disk.
+    files = {"/": (PAGE / "index.html", PAGE_POLICY), "/docs": (DOCS / "index.html", DOCS_POLICY)}
+    files |= {f"/assets/{path.name}": (path, PAGE_POLICY) for path in (PAGE / "assets").iterdir()}
+    files |= {f"/docs/{name}": (DOCS / name, DOCS_POLICY) for name in DOCS_FILES}
     routes = APIRouter(include_in_schema=False)
-    # Read and compressed now: it takes longer than a probe should wait for. Names are looked up
-    # here, never joined to a path of the disk.
-    docs = {name: _read(DOCS / name) for name in DOCS_FILES}
-    assets = {path.name: path for path in (PAGE / "assets").iterdir()}
 
+    # No coroutine: to compress a file takes longer than a probe should wait for.
     @routes.get("/")
-    def page(request: Request) -> Response:
-        return _answer(request, _read(PAGE / "index.html", prefix), PAGE_POLICY)
-
     @routes.get("/assets/{name}")
-    def asset(request: Request, name: str) -> Response:
-        if name not in assets:
-            raise HTTPException(404, f"the page has no file assets/{name}")
-        return _answer(request, _read(assets[name]), PAGE_POLICY, FOR_EVER)
-
     @routes.get("/docs")
-    async def description(request: Request) -> Response:
-        return _answer(request, docs["index.html"], DOCS_POLICY)
-
     @routes.get("/docs/{name}")
-    async def description_file(request: Request, name: str) -> Response:
-        if name not in docs:
+    def file(request: Request) -> Response:
+        path = request.scope["path"].removeprefix(request.scope["root_path"])
+        if path not in files:
             raise HTTPException(404, "the page has no such file")
-        return _answer(request, docs[name], DOCS_POLICY)
+        source, policy = files[path]
+        sent = _read(source, prefix if path == "/" else "")
+        headers = {
+            "Cache-Control": FOR_EVER if path.startswith("/assets/") else ASK_AGAIN,
+            "Content-Security-Policy": policy,
+            # Weak: both encodings have it (RFC 9110, 8.8.1).
+            "ETag": f"W/{sent.tag}",
+            "Referrer-Policy": "no-referrer",
+            "Vary": "Accept-Encoding",
+        }
+        if is_known(sent.tag, request):
+            return Response(status_code=304, headers=headers)
+        content = sent.content
+        if quality("gzip", request.headers.get("accept-encoding", "")):
+            content = sent.packed
+            headers["Content-Encoding"] = "gzip"
+        return Response(content, headers=headers, media_type=sent.media_type)
 
     return routes
 
@@ -98,22 +105,3 @@ def _read(path: Path, prefix: str = "") -> _File:
         content = content.replace(b'="assets/', f'="{prefix}/assets/'.encode())
     tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
     return _File(content, gzip.compress(content, mtime=0), MEDIA_TYPES[path.suffix], tag)
-
-
-def _answer(request: Request, file: _File, policy: str, caching: str = ASK_AGAIN) -> Response:
-    """Answer with the file, or that the browser has it."""
-    headers = {
-        "Cache-Control": caching,
-        "Content-Security-Policy": policy,
-        # Weak: both encodings have it (RFC 9110, 8.8.1).
-        "ETag": f"W/{file.tag}",
-        "Referrer-Policy": "no-referrer",
-        "Vary": "Accept-Encoding",
-    }
-    if is_known(file.tag, request):
-        return Response(status_code=304, headers=headers)
-    content = file.content
-    if quality("gzip", request.headers.get("accept-encoding", "")):
-        content = file.packed
-        headers["Content-Encoding"] = "gzip"
-    return Response(content, headers=headers, media_type=file.media_type)

@@ -19,10 +19,13 @@ from ..options import (
     Options,
 )
 
+_EMPTY_IS_NONE = BeforeValidator(lambda value: None if value == "" else value)
 
-def _empty_is_absent(value: Any) -> Any:
-    """Take `budget=` in a URL for no budget at all."""
-    return None if value == "" else value
+
+def _optional(kind: Any, **bounds: Any) -> Any:
+    """Return the type of a parameter that may be absent, as `budget=` in a URL is."""
+    bounded = Annotated[kind, Field(**bounds)]
+    return Annotated[bounded | None, _EMPTY_IS_NONE]
 
 
 def _length(value: Any) -> float | Literal["auto"]:
@@ -38,28 +41,23 @@ def _length(value: Any) -> float | Literal["auto"]:
     return length
 
 
-_Name = Annotated[str | None, BeforeValidator(_empty_is_absent)]
-_Length = Annotated[
-    Annotated[str, Field(pattern=f"^{LENGTH_PATTERN}$")] | None, BeforeValidator(_empty_is_absent)
-]
+_NAME = _optional(str)
+_LENGTH = _optional(str, pattern=f"^{LENGTH_PATTERN}$")
 # Where a type of `Options` does not say all that it refuses.
 _TYPES = get_type_hints(Options) | {
     "levels": Annotated[int, Field(ge=1, le=MAX_LEVELS)],
-    "budget": Annotated[
-        Annotated[float, Field(ge=0, allow_inf_nan=False)] | None,
-        BeforeValidator(_empty_is_absent),
-    ],
+    "budget": _optional(float, ge=0, allow_inf_nan=False),
     "reference_length": Annotated[
         Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
         BeforeValidator(_length),
     ],
     "crease": Annotated[str, Field(pattern=f"^({CREASE_PATTERN})$")],
     "weld_tolerance": Annotated[float, Field(ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)],
-    "material": _Name,
-    "tolerance": _Length,
-    "max_faces": Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(_empty_is_absent)],
-    "max_edge_length": _Length,
-    "group": _Name,
+    "material": _NAME,
+    "tolerance": _LENGTH,
+    "max_faces": _optional(int, ge=1),
+    "max_edge_length": _LENGTH,
+    "group": _NAME,
 }
 _SHARED: dict[str, Any] = {
     option.name: (
@@ -75,7 +73,7 @@ class Parameters(create_model("Shared", **_SHARED)):
 
     model_config = ConfigDict(extra="forbid")
 
-    model: _Name = Field(
+    model: Annotated[str | None, _EMPTY_IS_NONE] = Field(
         default=None,
         description="a name from `GET /models`; empty: the service's default. `scheme=loop` has no "
         "use for it or for `budget`: both are checked and then have no effect",

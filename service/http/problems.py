@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from difflib import get_close_matches
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import BusyError, InvalidParameter, LimitError, ServiceError, UnauthorizedError
 from ..log_lines import REQUEST_ID
@@ -45,43 +46,54 @@ class Problem(BaseModel):
     )
 
 
-def problem(
-    status: int,
-    code: str,
-    title: str,
-    detail: str,
-    *,
-    headers: dict[str, str] | None = None,
-    **members: Any,
-) -> ProblemResponse:
-    """Return one problem document; members that are None are left out."""
-    body = {
-        "type": f"urn:pns:problem:{code}",
-        "title": title,
-        "status": status,
-        "detail": detail,
-        "code": code,
-    }
-    members["request_id"] = REQUEST_ID.get()
-    body |= {name: value for name, value in members.items() if value is not None}
-    return ProblemResponse(body, status, headers=headers)
-
-
 class ProblemResponse(JSONResponse):
-    """A problem document, whose code goes into the journal."""
+    """A problem document, whose code goes into the journal; members that are None are left out."""
 
     media_type = MEDIA_TYPE
 
     def __init__(
-        self, content: dict[str, Any], status: int, headers: dict[str, str] | None = None
+        self,
+        status: int,
+        code: str,
+        title: str,
+        detail: str,
+        *,
+        headers: dict[str, str] | None = None,
+        **members: Any,
     ) -> None:
-        super().__init__(content, status, headers=headers)
-        self.code = content["code"]
+        body = {
+            "type": f"urn:pns:problem:{code}",
+            "title": title,
+            "status": status,
+            "detail": detail,
+            "code": code,
+        }
+        members["request_id"] = REQUEST_ID.get()
+        body |= {name: value for name, value in members.items() if value is not None}
+        super().__init__(body, status, headers=headers)
+        self.code = code
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send it."""
         scope.setdefault("state", {})["problem"] = self.code
         await super().__call__(scope, receive, send)
+
+
+class Checked:
+    """ASGI layer that answers with the problem where a check of a request's head finds one."""
+
+    def __init__(self, app: ASGIApp, check: Callable[[Scope], None]) -> None:
+        self.app = app
+        self.check = check
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        try:
+            self.check(scope)
+        except ServiceError as error:
+            await of_service_error(error)(scope, receive, send)
+        else:
+            await self.app(scope, receive, send)
 
 
 def of_service_error(error: ServiceError) -> ProblemResponse:
@@ -97,7 +109,9 @@ def of_service_error(error: ServiceError) -> ProblemResponse:
             headers["Retry-After"] = str(error.retry_after)
         case UnauthorizedError():
             headers["WWW-Authenticate"] = 'Bearer realm="pns"'
-    return problem(error.status, error.code, error.title, error.detail, headers=headers, **members)
+    return ProblemResponse(
+        error.status, error.code, error.title, error.detail, headers=headers, **members
+    )
 
 
 def of_failure(error: ServiceError | JobFaultError) -> ProblemResponse:
@@ -110,7 +124,17 @@ def of_failure(error: ServiceError | JobFaultError) -> ProblemResponse:
     return of_service_error(error)
 
 
-def _of_validation_error(error: RequestValidationError) -> ProblemResponse:
+def internal_error() -> ProblemResponse:
+    """Return the document of a fault of ours: plain, because its details belong in the log."""
+    text = "The service failed; it is logged."
+    return ProblemResponse(500, "internal-error", "Internal error", text)
+
+
+async def _failure(_: Request, error: ServiceError | JobFaultError) -> ProblemResponse:
+    return of_failure(error)
+
+
+async def _validation_error(_: Request, error: RequestValidationError) -> ProblemResponse:
     first = error.errors()[0]
     name = next((str(part) for part in first["loc"][1:]), "")
     text = first["msg"]
@@ -120,7 +144,7 @@ def _of_validation_error(error: RequestValidationError) -> ProblemResponse:
     return of_service_error(InvalidParameter(name, f"{name}: {text}"))
 
 
-def _of_http_exception(error: HTTPException) -> ProblemResponse:
+async def _http_exception(_: Request, error: HTTPException) -> ProblemResponse:
     title = HTTPStatus(error.status_code).phrase
     code = title.lower().replace(" ", "-")
     headers, detail = dict(error.headers or {}), str(error.detail)
@@ -128,36 +152,25 @@ def _of_http_exception(error: HTTPException) -> ProblemResponse:
         detail = f"this path takes {headers['Allow']}"
     elif detail == HTTPStatus.NOT_FOUND.phrase:
         detail = "there is nothing at this path; /docs shows what there is"
-    return problem(error.status_code, code, title, detail, headers=headers)
+    return ProblemResponse(error.status_code, code, title, detail, headers=headers)
 
 
-def internal_error() -> ProblemResponse:
-    """Return the document of a fault of ours: plain, because its details belong in the log."""
-    return problem(500, "internal-error", "Internal error", "The service failed; it is logged.")
+async def _client_disconnect(_: Request, error: ClientDisconnect) -> Response:
+    # Nobody reads it; the number is the one that proxies log for this.
+    return Response(status_code=499)
 
 
-def install(app: FastAPI) -> None:
-    """Make every error of `app` a problem document."""
-
-    @app.exception_handler(JobFaultError)
-    @app.exception_handler(ServiceError)
-    async def failure(request: Request, error: ServiceError | JobFaultError) -> ProblemResponse:
-        return of_failure(error)
-
-    @app.exception_handler(RequestValidationError)
-    async def validation_error(request: Request, error: RequestValidationError) -> ProblemResponse:
-        return _of_validation_error(error)
-
-    @app.exception_handler(HTTPException)
-    async def http_exception(request: Request, error: HTTPException) -> ProblemResponse:
-        return _of_http_exception(error)
-
-    @app.exception_handler(ClientDisconnect)
-    async def client_disconnect(request: Request, error: ClientDisconnect) -> Response:
-        # Nobody reads it; the number is the one that proxies log for this.
-        return Response(status_code=499)
-
+async def _fault(_: Request, error: Exception) -> ProblemResponse:
     # Starlette answers with this and raises the error again, so that the server logs it.
-    @app.exception_handler(Exception)
-    async def fault(request: Request, error: Exception) -> ProblemResponse:
-        return internal_error()
+    return internal_error()
+
+
+# Every error of an application, as a problem document.
+HANDLERS: dict[Any, Any] = {
+    ServiceError: _failure,
+    JobFaultError: _failure,
+    RequestValidationError: _validation_error,
+    HTTPException: _http_exception,
+    ClientDisconnect: _client_disconnect,
+    Exception: _fault,
+}

@@ -13,11 +13,10 @@ from pns_common.scheme_names import BASE_SCHEMES
 
 from ..bodies import media
 from ..errors import NoModelError
-from ..settings import Settings
 from ..workers.models import ModelEntry
 from . import openapi
-from .access.clients import Client, client_of
-from .answer import FileAnswer, StreamAnswer, answer_type, is_known, unless_gone
+from .access.clients import client_of
+from .answer import answer_type, file_answer, is_known, stream_answer, unless_gone
 from .jobs import Service
 from .parameters import Parameters
 
@@ -45,21 +44,6 @@ class LimitsEntry(BaseModel):
     schemes: list[str] = Field(description="base schemes that `scheme=` takes beside auto and pns")
 
 
-def limits_of(settings: Settings, client: Client) -> LimitsEntry:
-    """Return the limits that the settings set, and the budget of who asks."""
-    return LimitsEntry(
-        body_bytes=int(settings.body),
-        faces=settings.faces,
-        faces_per_minute=client.faces_per_minute,
-        levels=Range(min=1, max=settings.levels),
-        memory_bytes=int(settings.memory),
-        seconds=settings.job_seconds,
-        requests=settings.client_requests,
-        formats=list(media.ACCEPTED),
-        schemes=list(BASE_SCHEMES),
-    )
-
-
 def router(service: Service) -> APIRouter:
     """Make the routes, bound to one service."""
     routes = APIRouter()
@@ -82,11 +66,22 @@ def router(service: Service) -> APIRouter:
             return Response(status_code=304, headers=headers)
         return Response(catalogue.content, headers=headers, media_type=media.JSON)
 
-    @routes.get("/limits", response_model=LimitsEntry, **openapi.LIMITS)
+    @routes.get("/limits", summary="What a request may ask for")
     async def limits(request: Request) -> LimitsEntry:
-        return limits_of(service.settings, client_of(request, service.settings))
+        settings = service.settings
+        return LimitsEntry(
+            body_bytes=int(settings.body),
+            faces=settings.faces,
+            faces_per_minute=client_of(request, settings).faces_per_minute,
+            levels=Range(min=1, max=settings.levels),
+            memory_bytes=int(settings.memory),
+            seconds=settings.job_seconds,
+            requests=settings.client_requests,
+            formats=list(media.ACCEPTED),
+            schemes=list(BASE_SCHEMES),
+        )
 
-    @routes.get("/healthz", **openapi.HEALTHZ)
+    @routes.get("/healthz", tags=[openapi.PROBES], summary="Whether the process answers")
     async def healthz() -> dict[str, str]:
         return {"status": "ok"}
 
@@ -111,7 +106,7 @@ async def _subdivide(
         job = await held.enter_async_context(taking)
         if is_stream:
             file_type = media.MEDIA_TYPES[parameters.format]
-            return StreamAnswer(service, job, held.pop_all(), file_type)
+            return stream_answer(service, job, held.pop_all(), file_type, request)
         await unless_gone(request.receive, service.serve(job))
         file = job.report if is_report else job.answer
-        return FileAnswer(service, job, held.pop_all(), kind, file)
+        return file_answer(service, job, held.pop_all(), kind, file)

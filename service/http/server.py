@@ -8,9 +8,9 @@ import logging
 import os
 import signal
 import socket
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -34,11 +34,10 @@ class Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen."""
         await super().startup(sockets)
-        for server in self.servers:
-            for listening in server.sockets:
-                if is_loopback(self.config.host):
-                    at = f"[{self.config.host}]" if ":" in self.config.host else self.config.host
-                    print(f"Open http://{at}:{listening.getsockname()[1]}", flush=True)
+        host, port = self.config.host, self.servers[0].sockets[0].getsockname()[1]
+        if is_loopback(host):
+            at = f"[{host}]" if ":" in host else host
+            print(f"Open http://{at}:{port}", flush=True)
 
 
 def serve(settings: Settings) -> None:
@@ -57,7 +56,7 @@ def serve(settings: Settings) -> None:
     gc.freeze()
     for number in (signal.SIGTERM, signal.SIGINT):
         # Uvicorn takes the signal, ends in order, and then sends it again.
-        signal.signal(number, _end)
+        signal.signal(number, lambda *_: sys.exit(0))
     Server(configuration(app, settings)).run()
 
 
@@ -73,11 +72,6 @@ def serve_metrics(app: FastAPI, host: str, port: int, of_service: int) -> None:
     log.info("metrics on http://%s:%d/metrics", host, port)
 
 
-def _end(number: int, _: FrameType | None) -> None:
-    """End as asked."""
-    raise SystemExit(0)
-
-
 def _bound(settings: Settings) -> socket.socket:
     """Take the address, and do not listen there yet. Raises StartError where it is taken.
 
@@ -90,11 +84,8 @@ def _bound(settings: Settings) -> socket.socket:
         bound.bind((host, port))
     except OSError as error:
         bound.close()
-        number, hint = error.errno or 0, "give another --host or --port"
-        if number < 0:
-            # Of getaddrinfo: the host is no address.
-            raise StartError(f"{error.strerror}: {host!r}; {hint}") from error
-        raise StartError(f"{os.strerror(number)} at {host}:{port}; {hint}") from error
+        hint = "give another --host or --port"
+        raise StartError(f"{error.strerror} at {host}:{port}; {hint}") from error
     return bound
 
 

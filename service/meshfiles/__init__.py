@@ -1,1 +1,1 @@
-"""Plain mesh files: OBJ, PLY, STL, OFF, and conversion from and to glTF."""
+"""Plain mesh files: OBJ, PLY, STL, OFF, 3MF, and conversion from and to glTF."""

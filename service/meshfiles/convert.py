@@ -33,7 +33,7 @@ from ..options import MAX_LEVELS, Limits, Options
 from ..report import Change, changes_of, hint_on
 from .companions import companions, copied
 from .flatten import Surface, check_copies, flatten
-from .formats import FORMATS, held, read_within
+from .formats import FORMATS, OF_TRIANGLES, held, read_within
 from .glb import as_glb, as_gltf_json
 from .mesh_file import NORMAL, MeshFile
 from .mtl import nearby
@@ -153,7 +153,7 @@ def _convert_one(
     seconds = time.perf_counter() - began
     name = "stdout" if job.output == STREAM else job.output
     # What formats of triangles hold; a file of quads alone is counted in its faces.
-    polygons = written.triangles != written.faces and job.target not in (*GLTF_KINDS, "stl")
+    polygons = written.triangles != written.faces and job.target not in (*GLTF_KINDS, *OF_TRIANGLES)
     count, what = (written.faces, "faces") if polygons else (written.triangles, "triangles")
     more = ""
     if options.levels < MAX_LEVELS and not (options.selects or options.goals):
@@ -298,8 +298,7 @@ def _triangles_of(mesh: MeshFile) -> int:
 def _map_of(mesh: MeshFile, target: str) -> Arrays:
     if mesh.parents is None:
         return {}
-    # The vertices of an STL are its corners.
-    return matrix_arrays(mesh.parents.take(mesh.corners) if target == "stl" else mesh.parents)
+    return matrix_arrays(mesh.parents.take(FORMATS[target].order(mesh)))
 
 
 def _taken(
@@ -457,8 +456,11 @@ def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any
 @contextmanager
 def _progress(console: Console) -> Iterator[Course]:
     """Show a bar on a terminal while the work goes on, and leave nothing behind."""
+    if not console.is_terminal:
+        yield Course()
+        return
     from rich.progress import Progress
 
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(console=console, transient=True) as bar:
         task = bar.add_task("refining", total=1.0)
         yield Course(moves=lambda share: bar.update(task, completed=share))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int, Shaped, UInt8
 
 from pns_common.mesh.rows import disjoint_faces, unit
 
@@ -20,7 +20,7 @@ from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Document
 from ..gltf.read.upload import Upload
 from ..gltf.refine.attributes import RefinedPrimitive
-from ..gltf.refine.columns import read_skin_and_morph
+from ..gltf.refine.skin import read_skin_and_morph
 from ..meshes.weld import weld, weld_by_label
 from ..options import Limits
 from ..report import Change
@@ -408,10 +408,27 @@ def _joined(
     if materials:
         of_face = np.concatenate([mesh.labels[MATERIAL].of_face for mesh in placed])
         labels[MATERIAL] = Labels(tuple(materials), of_face)
+        if form.unit and COLOUR not in layers:
+            layers[COLOUR] = Layer(_shown_colours(tree), np.repeat(of_face, 3))
     faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
     made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
     labels = {kind: label for kind, label in labels.items() if kind in form.labels}
-    return replace(made, layers=layers, labels=labels)
+    made = replace(made, layers=layers, labels=labels)
+    if form.unit:
+        # Metres, and z upwards.
+        points = made.vertices * [1, 1, -1]
+        made = replace(made, vertices=points[:, [0, 2, 1]], unit="meter")
+    return made
+
+
+def _shown_colours(tree: dict[str, Any]) -> UInt8[np.ndarray, "M 4"]:
+    """Return the base colours of materials as sRGB and opacity, a byte each."""
+    surfaces = (material.get("pbrMetallicRoughness", {}) for material in tree["materials"])
+    given = np.array([surface.get("baseColorFactor", [1.0] * 4) for surface in surfaces])
+    linear, opacity = given[:, :3], given[:, 3:]
+    bright = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    shown = np.hstack([np.where(linear > 0.0031308, bright, 12.92 * linear), opacity])
+    return np.rint(255 * np.clip(shown, 0, 1)).astype(np.uint8)
 
 
 def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:

@@ -34,6 +34,14 @@ from .parts import LARGEST, with_vertex_layers
 from .ply import read_ply, write_ply
 from .stl import is_text, read_stl, write_stl
 from .text import count_words
+from .threemf import (
+    UNIT,
+    faces_of_several_colours,
+    read_3mf,
+    unpacked_size,
+    vertices_of_objects,
+    write_3mf,
+)
 from .triangulate import triangulated
 
 
@@ -46,17 +54,27 @@ class Format:
         vertex_layers: those of which a vertex has one value.
         face_values, labels: those of faces; None: any.
         double: whether positions keep more digits than float32 has.
-        bytes_per_byte: memory that reading a binary file takes for each of its bytes.
+        triangles: whether other polygons are cut.
+        partial: layers that some corners may lack.
+        order: the vertex that each one of a written file is.
+        unit: whether it says of what unit lengths are.
+        binary: bytes of a file that are no text, unpacked.
+        bytes_per_byte: memory that reading takes for each of these.
     """
 
     read: Callable[[bytes], MeshFile]
     write: Callable[[MeshFile], bytes]
+    binary: Callable[[bytes], int] = lambda data: 0
     bytes_per_byte: int = 0
     layers: frozenset[str] | None = frozenset()
     vertex_layers: frozenset[str] | None = frozenset()
     face_values: frozenset[str] | None = frozenset()
     labels: frozenset[str] = frozenset()
     double: bool = False
+    triangles: bool = False
+    partial: frozenset[str] = frozenset()
+    order: Callable[[MeshFile], Int[np.ndarray, " W"]] = lambda mesh: np.arange(len(mesh.vertices))
+    unit: bool = False
 
 
 FORMATS = {
@@ -67,10 +85,12 @@ FORMATS = {
         vertex_layers=frozenset({COLOUR}),
         labels=frozenset({MATERIAL, GROUP, OBJECT, SMOOTHING}),
         double=True,
+        partial=frozenset({UV, NORMAL}),
     ),
     "off": Format(
         read_off,
         write_off,
+        lambda data: len(data) * is_binary(data),
         bytes_per_byte=60,
         layers=frozenset({UV, NORMAL, COLOUR}),
         vertex_layers=None,
@@ -78,10 +98,39 @@ FORMATS = {
         double=True,
     ),
     "ply": Format(
-        read_ply, write_ply, bytes_per_byte=150, layers=None, vertex_layers=None, face_values=None
+        read_ply,
+        write_ply,
+        lambda data: len(data) * (b"ascii" not in data[:200]),
+        bytes_per_byte=150,
+        layers=None,
+        vertex_layers=None,
+        face_values=None,
     ),
-    "stl": Format(read_stl, write_stl, bytes_per_byte=12),
+    "stl": Format(
+        read_stl,
+        write_stl,
+        lambda data: len(data) * (not is_text(data)),
+        bytes_per_byte=12,
+        triangles=True,
+        order=lambda mesh: mesh.corners,
+    ),
+    "3mf": Format(
+        read_3mf,
+        write_3mf,
+        unpacked_size,
+        bytes_per_byte=10,
+        layers=frozenset({COLOUR}),
+        face_values=frozenset(),
+        labels=frozenset({MATERIAL, OBJECT}),
+        double=True,
+        triangles=True,
+        partial=frozenset({COLOUR}),
+        order=vertices_of_objects,
+        unit=True,
+    ),
 }
+
+OF_TRIANGLES = frozenset(kind for kind, form in FORMATS.items() if form.triangles)
 
 
 def memory_to_read(data: bytes, kind: str) -> int:
@@ -89,10 +138,9 @@ def memory_to_read(data: bytes, kind: str) -> int:
 
     A text takes them by its letters, its lines and its words, measured on the shortest of each.
     """
-    binary = {"stl": lambda: not is_text(data), "ply": lambda: b"ascii" not in data[:200]}
-    binary["off"] = lambda: is_binary(data)
-    if kind in binary and binary[kind]():
-        return FORMATS[kind].bytes_per_byte * len(data)
+    form = FORMATS[kind]
+    if size := form.binary(data):
+        return form.bytes_per_byte * size
     lines = data.count(b"\n") + data.count(b"\r")
     return 8 * len(data) + 170 * lines + 130 * count_words(data)
 
@@ -146,7 +194,7 @@ def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
 
 
 def write(mesh: MeshFile, kind: str) -> bytes:
-    """Write the file's bytes: PLY and STL binary, OBJ and OFF text; what it cannot hold is lost."""
+    """Write the file's bytes, of OBJ and OFF as text; what it cannot hold is lost."""
     return FORMATS[kind].write(held(mesh, kind)[0])
 
 
@@ -157,14 +205,13 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         UnrefinableError: a position beyond the range of float32, where that is all it holds.
     """
     form, lost = FORMATS[kind], dict[str, int]()
-    mesh = triangulated(mesh) if kind == "stl" else mesh
+    mesh = triangulated(mesh) if form.triangles else mesh
     why = f" dropped: not written to {kind.upper()} files"
     layers = {
         name: layer
         for name, layer in mesh.layers.items()
         if (form.layers is None or name in form.layers)
-        # An OBJ names values corner by corner, but for colours.
-        and ((layer.rows >= 0).all() or (kind == "obj" and name != COLOUR))
+        and ((layer.rows >= 0).all() or name in form.partial)
     }
     for name in mesh.layers.keys() - layers.keys():
         partly = form.layers is None or name in form.layers
@@ -173,6 +220,11 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         colours = as_fractions(layers[COLOUR].values)
         if (colours[:, 3:] < 1).any():
             lost["opacity of vertex colours"] = 1
+    if kind == "3mf":
+        lost["materials of faces of several colours"] = faces_of_several_colours(mesh)
+    # What says nothing of it is taken for millimetres.
+    if mesh.unit not in ("", UNIT) and not form.unit:
+        lost[f"unit of lengths, {mesh.unit},"] = 1
     values = {
         name: column
         for name, column in mesh.face_values.items()
@@ -208,12 +260,12 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
     faces = mesh.corners[fans(mesh.offsets)[0]]
-    after = _without_area(mesh.vertices.astype(np.float32), faces)
-    # Most meshes have no such face, and then none that rounding makes.
-    before = _without_area(mesh.vertices, faces) if after.any() else after
+    rounded, flat = mesh.vertices.astype(np.float32), 0
+    if not np.array_equal(rounded, mesh.vertices):
+        flat = int((_without_area(rounded, faces) & ~_without_area(mesh.vertices, faces)).sum())
     rounding = "once positions are rounded to float32"
     told = {
-        f"faces without an area {rounding}": int((after & ~before).sum()),
+        f"faces without an area {rounding}": flat,
         f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
             faces_too_far(mesh.vertices, faces)
         ),

@@ -29,11 +29,14 @@ from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Labels, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of, textured
 from .parts import Part, kinds_of, parts_of
+from .threemf import METRES
 from .triangulate import triangulated
 
 _SHAPES: tuple[Literal["SCALAR", "VEC2", "VEC3", "VEC4"], ...] = ("SCALAR", "VEC2", "VEC3", "VEC4")
 # Which corners of a quad its two triangles have, by the corner that both begin with.
 FANS = np.array([[k, (k + 1) % 4, (k + 2) % 4, k, (k + 2) % 4, (k + 3) % 4] for k in range(4)])
+# From z upwards, as a printer has it, to y upwards.
+UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 _STORED = {dtype for number, dtype in COMPONENT_TYPES.items() if number != UNSIGNED_INT}
 
 
@@ -81,7 +84,7 @@ def as_glb(
     shown = [_shown(part, materials) for part in parts]
     if all(part.material != len(materials) - 1 for part in shown):
         materials.pop()
-    tree = _tree(materials)
+    tree = _tree(materials, mesh.unit)
     if made.images:
         tree["images"] = [{"uri": uri} for uri in made.images]
         tree["textures"] = [{"source": number} for number in range(len(made.images))]
@@ -116,12 +119,14 @@ def triangles_glb(mesh: MeshFile, *, material: dict[str, Any] | None = None) -> 
     return write_glb(encode(writer.tree), pieces, [])
 
 
-def _tree(materials: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _tree(materials: Sequence[dict[str, Any]], unit: str = "") -> dict[str, Any]:
     tree: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "pns"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
+        "nodes": [
+            {"mesh": 0} | ({"rotation": UPRIGHT, "scale": 3 * [METRES[unit]]} if unit else {})
+        ],
     }
     return tree | ({"materials": list(materials)} if materials else {})
 

@@ -64,6 +64,7 @@ class MeshFile:
         changes: what the reader dropped or mended.
         tags: creases that the file states; None: it states none.
         parents: of a refined mesh, the vertices of the file that each vertex is made of.
+        unit: of its lengths, as a 3MF names it; "": it does not say.
     """
 
     vertices: Float[np.ndarray, "V 3"]
@@ -79,6 +80,7 @@ class MeshFile:
     changes: tuple[Change, ...] = ()
     tags: Tags | None = None
     parents: SubdivisionMatrix | None = None
+    unit: str = ""
 
     @property
     def sizes(self) -> Int[np.ndarray, " F"]:

@@ -42,7 +42,6 @@ from .text import (
     parsed,
     plain_text,
     rows_text,
-    whole_rows,
 )
 
 STATEMENTS = {MATERIAL: b"usemtl", GROUP: b"g", OBJECT: b"o", SMOOTHING: b"s"}
@@ -294,11 +293,11 @@ def write_obj(mesh: MeshFile) -> bytes:
 
     The first object stands before the vertices.
     """
-    pieces = [f"mtllib {name}\n" for name in mesh.libraries]
+    pieces = [f"mtllib {name}\n".encode(mesh.encoding) for name in mesh.libraries]
     objects = mesh.labels.get(OBJECT)
     first = NONE if objects is None or not len(mesh.sizes) else int(objects.of_face[0])
     if objects is not None and first >= 0:
-        pieces.append(f"o {objects.names[first]}\n")
+        pieces.append(f"o {objects.names[first]}\n".encode(mesh.encoding))
     colours = mesh.layers.get(COLOUR)
     rows = mesh.vertices
     if colours is not None:
@@ -312,12 +311,12 @@ def write_obj(mesh: MeshFile) -> bytes:
     if normals is not None:
         pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
     pieces += _faces_text(mesh, uv, normals, first)
-    return "".join(pieces).encode(mesh.encoding)
+    return b"".join(pieces)
 
 
 def _faces_text(
     mesh: MeshFile, uv: Layer | None, normals: Layer | None, said_object: int
-) -> Iterator[str]:
+) -> Iterator[bytes]:
     sizes = mesh.sizes
     has_uv, has_normal = (_of_faces(mesh, layer) for layer in (uv, normals))
     labels = {kind: label.of_face for kind, label in mesh.labels.items()}
@@ -331,7 +330,7 @@ def _faces_text(
             # One that has no name behind one that has would take that one's.
             if number != said[kind]:
                 name = mesh.labels[kind].names[number] if number >= 0 else _NAMELESS[kind]
-                yield f"{STATEMENTS[kind].decode()} {name}\n"
+                yield STATEMENTS[kind] + f" {name}\n".encode(mesh.encoding)
                 said[kind] = number
         yield from _run_text(
             mesh, begin, end, uv if has_uv[begin] else None, normals if has_normal[begin] else None
@@ -343,25 +342,24 @@ _NAMELESS = {MATERIAL: "none", GROUP: "default", OBJECT: "default", SMOOTHING: "
 
 def _run_text(
     mesh: MeshFile, begin: int, end: int, uv: Layer | None, normals: Layer | None
-) -> Iterator[str]:
+) -> Iterator[bytes]:
     """Write faces that all have the same kinds of references."""
-    form = " %" + ("/%" if uv is not None else "/" if normals is not None else "")
-    form += "/%" if normals is not None else ""
+    form = " %d" + ("/%d" if uv is not None else "/" if normals is not None else "")
+    form += "/%d" if normals is not None else ""
     columns = [mesh.corners, *(layer.rows for layer in (uv, normals) if layer is not None)]
     sizes = mesh.sizes
     if (sizes[begin:end] == sizes[begin]).all():
         size, share = int(sizes[begin]), slice(mesh.offsets[begin], mesh.offsets[end])
         numbers = np.stack([column[share] + 1 for column in columns], axis=1)
-        yield from whole_rows(f"f{form * size}\n".encode(), numbers.reshape(end - begin, -1))
+        yield from rows_text(f"f{form * size}\n", numbers.reshape(end - begin, -1))
         return
-    form = form.replace("%", "%d")
     for start in range(begin, end, BLOCK):
         stop = min(start + BLOCK, end)
         share = slice(mesh.offsets[start], mesh.offsets[stop])
         numbers = np.stack([column[share] + 1 for column in columns], axis=1)
         forms = {size: f"f{form * size}\n" for size in np.unique(sizes[start:stop]).tolist()}
         text = "".join(forms[size] for size in sizes[start:stop].tolist())
-        yield text % tuple(numbers.reshape(-1).tolist())
+        yield (text % tuple(numbers.reshape(-1).tolist())).encode()
 
 
 def _of_faces(mesh: MeshFile, layer: Layer | None) -> Bool[np.ndarray, " F"]:

@@ -275,7 +275,7 @@ def write_off(mesh: MeshFile) -> bytes:
         values[mesh.corners] = layer.values[layer.rows]
         columns.append(values)
         form += (_form(layer.values) if name == COLOUR else f" {NUMBER}") * values.shape[1]
-    pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n"]
+    pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n".encode()]
     pieces += rows_text(f"{form}\n", np.hstack(columns))
     colours = mesh.face_values.get(COLOUR)
     behind = "" if colours is None else _form(colours) * colours.shape[1]
@@ -286,7 +286,7 @@ def write_off(mesh: MeshFile) -> bytes:
         rows = [np.full((len(faces), 1), size), faces]
         rows += [] if colours is None else [colours[chosen]]
         pieces += rows_text(f"%d{' %d' * size}{behind}\n", np.hstack(rows))
-    return "".join(pieces).encode()
+    return b"".join(pieces)
 
 
 def _form(colours: np.ndarray) -> str:

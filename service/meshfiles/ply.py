@@ -435,14 +435,15 @@ def _face_bytes(
     beside = np.dtype(count).itemsize + sum(np.dtype(kind).itemsize for _, kind in fields)
     starts = offsets_of(beside + 4 * sizes)
     content = np.empty(starts[-1], dtype=np.uint8)
-    for size in np.unique(sizes).tolist():
-        chosen = np.flatnonzero(sizes == size)
-        corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
-        rows = [np.full(len(chosen), size), *corners.T, *(column[chosen] for column in columns)]
+    for size in np.flatnonzero(np.bincount(sizes)).tolist():
         kinds = [("", count), *[("", "i4")] * size, *fields]
-        table = _records(kinds, rows, len(chosen))
+        chosen = np.flatnonzero(sizes == size)
         if len(chosen) == len(sizes):
-            return table.tobytes()
+            corners = mesh.corners.reshape(-1, size)
+            return _records(kinds, [sizes, *corners.T, *columns], len(sizes)).tobytes()
+        corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
+        rows = [sizes[chosen], *corners.T, *(column[chosen] for column in columns)]
+        table = _records(kinds, rows, len(chosen))
         table = table.view(np.uint8).reshape(len(chosen), -1)
         content[starts[chosen, None] + np.arange(table.shape[1])] = table
     return content.tobytes()

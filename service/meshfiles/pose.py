@@ -14,7 +14,7 @@ from ..errors import GltfError
 from ..gltf.constants import FLOAT
 from ..gltf.read.accessors import read
 from ..gltf.read.upload import Upload
-from ..gltf.refine.columns import Binding
+from ..gltf.refine.skin import Binding
 
 # Of the largest coordinate: what products of float32 matrices are off by, and somewhat more.
 ROUNDING = 1e-5

@@ -11,12 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, Shaped, UInt8
 
+from pns_common.kernels import text as kernels
+
 from ..errors import UnreadableError
 
 # How text formats write a coordinate: micrometres are kept in coordinates of kilometres.
 NUMBER = "%.12g"
 # Rows of text that are made at a time.
 BLOCK = 2**14
+# What is written in bulk: other numbers are few.
+SMALLEST, LARGEST = 1e-10, 1e22
+POWERS, WHOLES = 10.0 ** np.arange(23), 10 ** np.arange(17)
+_DIGITS = {"%.7g": 7, NUMBER: 12}
+_PLACE = re.compile(r"%[#.\d]*[dg]")
 _BLANK, _LINE_END, _COMMENT, _BACKSLASH = b" \n#\\"
 _BEHIND_NAME = re.compile(rb"\s#(?:\s.*)?$", re.DOTALL)
 # How Microsoft's old libraries write infinity and NaN.
@@ -235,26 +242,27 @@ def _without_comments(
     return blank
 
 
-def whole_rows(form: bytes, numbers: Int[np.ndarray, "N K"]) -> Iterator[str]:
-    """Write each row by a form that has a % for each of its numbers, which are not below 0."""
-    parts = [np.frombuffer(part, np.uint8) for part in form.split(b"%")]
-    digits = len(str(int(numbers.max(initial=0))))
-    width = sum(map(len, parts)) + digits * numbers.shape[1]
-    for begin in range(0, len(numbers), BLOCK):
-        block = numbers[begin : begin + BLOCK].astype(np.uint32 if digits < 10 else np.uint64)
-        # Zeros are left out: those in front of a number.
-        made, at = np.zeros((len(block), width), dtype=np.uint8), 0
-        for part, column in zip(parts, [*block.T, None], strict=True):
-            made[:, at : at + len(part)] = part
-            at += len(part)
-            for place in range(digits if column is not None else 0):
-                rest = column // 10 ** (digits - 1 - place)
-                made[:, at] = np.where((rest > 0) | (place == digits - 1), rest % 10 + 48, 0)
-                at += 1
-        yield made[made > 0].tobytes().decode()
-
-
-def rows_text(form: str, rows: Shaped[np.ndarray, "N K"]) -> list[str]:
-    """Write each row by a form for all of its numbers."""
-    blocks = (rows[begin : begin + BLOCK] for begin in range(0, len(rows), BLOCK))
-    return [form * len(block) % tuple(block.reshape(-1).tolist()) for block in blocks]
+def rows_text(form: str, rows: Shaped[np.ndarray, "N K"]) -> Iterator[bytes]:
+    """Write each row by a form of printf for all of its numbers, of %.12g or %.7g, or of %d."""
+    kinds, parts = _PLACE.findall(form), [part.encode() for part in _PLACE.split(form)]
+    letters = np.frombuffer(b"".join(parts), dtype=np.int8)
+    between = letters, np.cumsum([len(part) for part in parts])
+    end = np.zeros(1, dtype=np.int64)
+    kind = kinds[0] if len(set(kinds)) == 1 else ""
+    for begin in range(0, len(rows), BLOCK):
+        block = rows[begin : begin + BLOCK] + 0  # no −0
+        size = np.abs(block)
+        if kind == "%d" and block.dtype.kind in "iu" and block.min() >= 0:
+            longest = len(str(int(block.max())))
+            out = np.empty(len(block) * (len(letters) + longest * len(kinds)), dtype=np.int8)
+            kernels.write_wholes(np.ascontiguousarray(block, np.int64), *between, out, end)
+        elif kind in _DIGITS and ((size == 0) | ((size >= SMALLEST) & (size < LARGEST))).all():
+            digits = _DIGITS[kind]
+            # Beside its digits a number has a sign, a point, and four zeros or an exponent.
+            out = np.empty(len(block) * (len(letters) + (digits + 7) * len(kinds)), dtype=np.int8)
+            numbers = np.ascontiguousarray(block, np.float64)
+            kernels.write_numbers(numbers, digits, *between, POWERS, WHOLES, out, end)
+        else:
+            yield (form * len(block) % tuple(block.reshape(-1).tolist())).encode()
+            continue
+        yield out[: end[0]].tobytes()

@@ -28,10 +28,10 @@ class Batch:
     """Options that a batch applies to each file.
 
     Attributes:
-        source, destination: paths or URLs; a folder, glob or manifest, and a folder.
+        source, destination: paths or URLs; a folder, glob or file, and a folder.
         to: the format of all results; None: each its own.
         model: a bundled name or a file; None: the default model.
-        report: the Parquet or JSON lines file; what is needed to go on lies beside it.
+        report: the JSON lines file; what is needed to go on lies beside it.
         dry: say what would be done, and write nothing but that.
     """
 
@@ -65,7 +65,7 @@ def run_batch(batch: Batch, engine: Engine[Task, Row], console: Console) -> Summ
         InvalidParameter: the source, the destination, the report, the model or a format cannot be
             used.
     """
-    check_report(batch.report, batch.source)
+    check_report(batch.report)
     if batch.to is not None and batch.to not in KINDS:
         raise InvalidParameter("to", f"{batch.to}: it must be one of {', '.join(KINDS)}")
     listing = items_of(batch.source, (*KINDS, *ALIASES), place_of(batch.destination))
@@ -156,8 +156,7 @@ def _tasks(
     journal: Journal,
     reject: Callable[[list[Row]], None],
 ) -> Iterator[Task]:
-    # A file that a manifest names again is refined once: nearby so, and known as done from then on.
-    while block := list(dict.fromkeys(islice(items, LOOK_UP))):
+    while block := list(islice(items, LOOK_UP)):
         tasks: list[Task] = []
         rejected: list[Row] = []
         with journal.together():

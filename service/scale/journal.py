@@ -12,15 +12,13 @@ import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from pns_common.files import replacing
 
 from ..errors import InvalidParameter
 from .job import PLANNED, SKIPPED, UNREADABLE_FOLDER, Known, Row
-from .places import THIS_MACHINE, Place, place_of
+from .places import place_of
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS rows (
@@ -29,8 +27,7 @@ CREATE TABLE IF NOT EXISTS rows (
 CREATE TABLE IF NOT EXISTS outputs (output TEXT PRIMARY KEY, path TEXT) WITHOUT ROWID;
 """
 BUSY_SECONDS = 60.0
-BATCH = 10_000
-REPORTS = (".parquet", ".jsonl")
+ENDING = ".jsonl"
 JOURNAL = ".pns-batch.journal"
 
 
@@ -120,35 +117,10 @@ class Journal:
                 self._database.close()
 
     def _write_report(self) -> None:
-        if self.report.suffix == ".parquet":
-            self._write_parquet()
-            return
-        with replacing(self.report) as temporary, temporary.open("w") as lines:
-            lines.writelines(f"{row}\n" for row in self._rows())
-
-    def _rows(self) -> Iterator[str]:
         query = "SELECT row FROM rows WHERE work = ? ORDER BY path"
-        for (text,) in self._database.execute(query, (self._work,)):
-            yield text
-
-    def _write_parquet(self) -> None:
-        import pyarrow as arrow
-        import pyarrow.parquet as parquet
-
-        schema = arrow.schema(
-            [(name, _arrow_type(arrow, name)) for name in Row("", "", "").as_dict()]
-        )
-        with (
-            replacing(self.report) as temporary,
-            parquet.ParquetWriter(temporary, schema) as writer,
-        ):
-            batch: list[dict[str, Any]] = []
-            for row in self._rows():
-                batch.append(json.loads(row))
-                if len(batch) == BATCH:
-                    writer.write_table(arrow.Table.from_pylist(batch, schema))
-                    batch = []
-            writer.write_table(arrow.Table.from_pylist(batch, schema))
+        with replacing(self.report) as temporary, temporary.open("w") as lines:
+            for (row,) in self._database.execute(query, (self._work,)):
+                lines.write(f"{row}\n")
 
 
 @contextmanager
@@ -174,31 +146,14 @@ def journal_of(report: Path) -> Path:
     return report.with_name(JOURNAL)
 
 
-def check_report(report: Path, source: str) -> None:
-    """Raise InvalidParameter where a report of a source cannot be written under this name."""
-    if report.suffix not in REPORTS:
-        raise InvalidParameter("report", f"{report}: it must end in {' or '.join(REPORTS)}")
+def check_report(report: Path) -> None:
+    """Raise InvalidParameter where a report cannot be written under this name."""
+    if report.suffix != ENDING:
+        raise InvalidParameter("report", f"{report}: it must end in {ENDING}")
     if not report.parent.is_dir():
         raise InvalidParameter("report", f"{report.parent}: there is no such folder")
     if report.is_dir():
         raise InvalidParameter("report", f"{report}: it is a folder")
-    if Place(THIS_MACHINE, str(report.absolute())).path_to(place_of(source)) == ".":
-        raise InvalidParameter("report", f"{report}: the report would replace SOURCE")
-    # Looked for, not loaded: that takes as long as a worker's start, and would go before it.
-    if report.suffix == ".parquet" and find_spec("pyarrow") is None:
-        raise InvalidParameter(
-            "report",
-            f"{report}: Parquet needs the extra: pip install 'pns-subdivision[ray]'; "
-            "a .jsonl needs none",
-        )
-
-
-def _arrow_type(arrow: Any, name: str) -> Any:
-    if name.startswith("seconds") or name == "limit_distance":
-        return arrow.float64()
-    if name.startswith(("faces_", "bytes_")) or name in ("attempts", "flipped_faces"):
-        return arrow.int64()
-    return arrow.string()
 
 
 @contextmanager

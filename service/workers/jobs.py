@@ -10,6 +10,7 @@ import logging
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..bodies.media import IDENTITY, Kind, decoded
@@ -17,9 +18,8 @@ from ..course import Course
 from ..memory_cap import memory_cap
 from ..options import Limits, Options
 from . import memory_file
-from .memory_file import FileName
 from .models import Catalogue, Models, catalogue_of
-from .progress import Reporter
+from .progress import PROGRESS
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
@@ -34,16 +34,15 @@ MEMORY_SLACK = 1024**3
 class Work:
     """One job, small enough for a pipe: its files go by their names.
 
-    `answer` and `report` are what the worker fills, None what nobody wants. `page` is where it
-    tells how far it is. `model` is the name of one of the worker's models; None: the served one.
-    `request_id` stands in what the worker logs. A body with an `encoding` unpacks to `body_bytes`
-    at most. `target` is the kind of file to answer with.
+    `answer` and `report` are what the worker fills, None what nobody wants. `model` is the name of
+    one of the worker's models; None: the served one. `request_id` stands in what the worker logs. A
+    body with an `encoding` unpacks to `body_bytes` at most. `target` is the kind of file to answer
+    with.
     """
 
-    body: FileName
-    answer: FileName | None
-    report: FileName | None
-    page: FileName
+    body: str
+    answer: str | None
+    report: str | None
     content_type: str
     options: Options
     model: str | None
@@ -78,11 +77,12 @@ def subdivide(work: Work) -> Done:
     from ..bodies import uploads
     from ..meshfiles.convert import converted
 
-    with Reporter(work.page) as reporter, job_memory(work.limits):
-        body = decoded(memory_file.read(work.body), work.encoding, work.body_bytes)
+    progress = PROGRESS.get()
+    with job_memory(work.limits):
+        body = decoded(Path(work.body).read_bytes(), work.encoding, work.body_bytes)
         sent = uploads.sent(body, work.content_type, work.limits)
         model = _MODELS.get(work.model) if work.options.learns else None
-        course = Course(begins=reporter.stage, moves=reporter.reach)
+        course = Course(begins=progress.begin, moves=progress.reach)
         written = converted(
             sent.data,
             sent.kind,

@@ -5,8 +5,8 @@ pieces, parses nothing and pickles nothing, so no upload can hold its event loop
 killed in the middle leaves no half-read pipe behind. On Linux the file is memory (no disk, no tmpfs
 quota); elsewhere a temporary file.
 
-A path into `/proc` is a number that the kernel gives to the next file once this one is closed, and
-a worker may open it late. So who opens it compares what was opened with what was meant.
+A path into `/proc` is a number that the kernel gives to the next file once this one is closed. So a
+file stays open until the worker that was given its path has ended its job, or has been killed.
 """
 
 from __future__ import annotations
@@ -14,24 +14,11 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from pathlib import Path
 
 from ..errors import NoStorageError
 
 PIECE = 256 * 1024
-
-
-class ForeignFileError(RuntimeError):
-    """A path led to another file than the one that was meant: a fault of ours."""
-
-
-@dataclass(frozen=True, slots=True)
-class FileName:
-    """Name by which another process opens a memory file: its path, its device and inode."""
-
-    path: str
-    device: int
-    inode: int
 
 
 class MemoryFile:
@@ -43,34 +30,20 @@ class MemoryFile:
 
     def __init__(self) -> None:
         try:
-            self._open()
+            if hasattr(os, "memfd_create"):
+                self._file = os.fdopen(os.memfd_create("pns", os.MFD_CLOEXEC), "w+b", buffering=0)
+                self.name = f"/proc/{os.getpid()}/fd/{self._file.fileno()}"
+            else:
+                self._file = tempfile.NamedTemporaryFile(prefix="pns-", buffering=0)  # noqa: SIM115
+                self.name = self._file.name
         except OSError as error:
             raise NoStorageError(f"no file can be made: {error.strerror}") from error
-
-    def _open(self) -> None:
-        if hasattr(os, "memfd_create"):
-            self._file = os.fdopen(os.memfd_create("pns", os.MFD_CLOEXEC), "w+b", buffering=0)
-            path = f"/proc/{os.getpid()}/fd/{self._file.fileno()}"
-        else:
-            self._file = tempfile.NamedTemporaryFile(prefix="pns-", buffering=0)  # noqa: SIM115
-            path = self._file.name
-        status = os.fstat(self._file.fileno())
-        self.name = FileName(path, status.st_dev, status.st_ino)
 
     def __enter__(self) -> MemoryFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give the memory back, once the worker that has it open has closed it too."""
         self._file.close()
-
-    @property
-    def descriptor(self) -> int:
-        """The descriptor of this process."""
-        return self._file.fileno()
 
     def append(self, data: bytes) -> None:
         """Write `data` at the end. Raises NoStorageError."""
@@ -89,29 +62,15 @@ class MemoryFile:
             offset += len(piece)
 
 
-def read(name: FileName) -> bytes:
-    """Read all bytes of another process's file. Raises ForeignFileError."""
-    with os.fdopen(opened(name, os.O_RDONLY), "rb") as file:
-        return file.read()
-
-
-def write(name: FileName, data: bytes) -> None:
-    """Fill the file of another process.
-
-    Raises ForeignFileError, and has then written nothing; NoStorageError, and has left nothing.
-    """
-    # Not truncated while it is opened: it might be another file.
-    descriptor = opened(name, os.O_WRONLY)
-    try:
-        os.ftruncate(descriptor, 0)
+def write(name: str, data: bytes) -> None:
+    """Fill the file of another process. Raises NoStorageError, and has then left nothing there."""
+    with Path(name).open("wb", buffering=0) as file:
         try:
-            _write(descriptor, data)
+            _write(file.fileno(), data)
         except NoStorageError:
             # What is half an answer would only keep the room from others.
-            os.ftruncate(descriptor, 0)
+            file.truncate(0)
             raise
-    finally:
-        os.close(descriptor)
 
 
 def _write(descriptor: int, data: bytes) -> None:
@@ -121,14 +80,3 @@ def _write(descriptor: int, data: bytes) -> None:
             view = view[os.write(descriptor, view) :]
     except OSError as error:
         raise NoStorageError(f"{len(data)} bytes do not fit: {error.strerror}") from error
-
-
-def opened(name: FileName, flags: int) -> int:
-    """Open another process's file; return its descriptor. Raises ForeignFileError."""
-    # Another file might be a pipe, whose opening waits for its other end.
-    descriptor = os.open(name.path, flags | os.O_CLOEXEC | os.O_NONBLOCK)
-    status = os.fstat(descriptor)
-    if (status.st_dev, status.st_ino) != (name.device, name.inode):
-        os.close(descriptor)
-        raise ForeignFileError(f"{name.path} is another file than the one that was meant")
-    return descriptor

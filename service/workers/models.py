@@ -151,7 +151,10 @@ def catalogue_of(models: Models) -> Catalogue:
         except NoModelError as error:
             log.warning("%s", error)
         else:
-            entries.append(_entry(model, default=source == served))
+            # One that was given to the application need not come from a file.
+            size, providers = getattr(model, "size", None), getattr(model, "providers", None)
+            named = {"name": model.name, "hash": model.hash, "size": size, "providers": providers}
+            entries.append(ModelEntry(default=source == served, **named, **asdict(model.card)))
             of_polygons = entries[-1].base == "catmull-clark" or model.name in COMPANIONS
             if source == served and not of_polygons:
                 log.warning(
@@ -160,10 +163,3 @@ def catalogue_of(models: Models) -> Catalogue:
                 )
     entries.sort(key=lambda entry: (entry.name, entry.default))
     return Catalogue(tuple(sorted(sources)), _ENTRIES.dump_json(entries))
-
-
-def _entry(model: Model, *, default: bool) -> ModelEntry:
-    # A model that was given to the application need not come from a file.
-    size, providers = getattr(model, "size", None), getattr(model, "providers", None)
-    named = {"name": model.name, "hash": model.hash, "size": size, "providers": providers}
-    return ModelEntry(default=default, **named, **asdict(model.card))

@@ -23,6 +23,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from ..errors import BusyError, JobTimeout, WorkerDied
 from . import worker
+from .progress import Progress
 
 T = TypeVar("T")
 
@@ -39,21 +40,65 @@ WATCH_SECONDS = 1.0
 log = logging.getLogger("pns.service")
 
 
+class _Process:
+    """A worker process, in a pebble pool of its own.
+
+    A pool breaks with a process that dies idle, and breaks nothing which another request waits on.
+
+    Attributes:
+        holder: the client that has it; None: it is free; "": the service itself.
+        warm: whether it has what jobs need.
+        broken: why its job did not come back: another process is to come in its place.
+        ended: whether it is gone.
+    """
+
+    def __init__(self, holder: str, progress: Progress) -> None:
+        self.progress = progress
+        self.pool = ProcessPool(
+            max_workers=1,
+            initializer=worker.prepare,
+            initargs=(progress,),
+            # Spawn, not fork: the server has threads, and a fork of them may deadlock.
+            context=multiprocessing.get_context("spawn"),
+        )
+        self.holder: str | None = holder
+        self.warm = False
+        self.broken: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        self.ended = asyncio.Event()
+
+    async def end(self) -> None:
+        """End the process; SIGTERM at once, SIGKILL where that does not do."""
+
+        def end() -> None:
+            self.pool.stop()
+            self.pool.join()
+
+        try:
+            await asyncio.to_thread(end)
+        except RuntimeError:
+            # No thread is left to wait in, and nothing else would start the next process.
+            end()
+        self.ended.set()
+
+
 @dataclass(eq=False)
 class Turn:
-    """A client's place in the line for a worker; `began` is when it got one."""
+    """A client's place in the line for a worker.
+
+    `began` is when it got one, and `progress` that of its job since then.
+    """
 
     client: str
-    pool: asyncio.Future[ProcessPool] = field(repr=False)
+    process: asyncio.Future[_Process] = field(repr=False)
     began: float | None = None
+    progress: Progress | None = None
 
 
 class Workers:
     """`count` worker processes, each with one job at a time of at most `seconds`.
 
-    Every process has a pebble pool of its own: a pool breaks with a process that dies idle, and
-    breaks nothing which another request waits on. A pool whose job did not come back is thrown away
-    and replaced; `replaced` is told why. `warm_up` is called in each new process, before any job.
+    A process whose job did not come back is ended and replaced; `replaced` is told why. `warm_up`
+    is called in each new process, before any job.
     """
 
     def __init__(
@@ -69,42 +114,37 @@ class Workers:
         self._replaced = replaced
         self._most = max(1, count - 1)
         self._waiting: list[Turn] = []
-        self._free: list[ProcessPool] = []
-        self._pools: set[ProcessPool] = set()
-        self._warm: set[ProcessPool] = set()
-        self._holders: dict[ProcessPool, str] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._ends: dict[ProcessPool, asyncio.Task[None]] = {}
-        self._stopping = False
-        self.held: Counter[str] = Counter()
-        """Number of workers by client, those that end its last job among them."""
+        self._processes: list[_Process] = []
+        self._keepers: list[asyncio.Task[None]] = []
 
     @property
     def ready(self) -> bool:
         """True while a worker that has warmed up is alive."""
-        return any(pool.active for pool in self._warm)
+        return any(process.warm and process.pool.active for process in self._processes)
 
     @property
     def waiting(self) -> int:
         """Number of jobs that wait for a worker."""
         return len(self._waiting)
 
+    @property
+    def held(self) -> Counter[str]:
+        """Number of workers by client, those that end its last job among them."""
+        return Counter(process.holder for process in self._processes if process.holder)
+
     def start(self) -> None:
         """Start the processes; they warm up in the background."""
         # Python's own allocator keeps a MiB for each small object that is left in it: a document of
         # countless parts would stay for good. What glibc's has free it gives back page by page.
         os.environ.setdefault("PYTHONMALLOC", "malloc")
-        for _ in range(self._count):
-            self._in_background(self._add(""))
-        self._in_background(self._watch())
+        loop = asyncio.get_running_loop()
+        self._keepers = [loop.create_task(self._keep_one()) for _ in range(self._count)]
 
     async def stop(self) -> None:
         """End every process, whatever it is doing."""
-        self._stopping = True
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await asyncio.gather(*(self._end(pool) for pool in self._pools))
+        for keeper in self._keepers:
+            keeper.cancel()
+        await asyncio.gather(*self._keepers, return_exceptions=True)
 
     def join(self, client: str) -> Turn:
         """Stand in line. `run` must follow."""
@@ -117,17 +157,11 @@ class Workers:
         """Count the jobs in front of one that waits."""
         return self._waiting.index(turn) if turn in self._waiting else 0
 
-    async def run(
-        self,
-        turn: Turn,
-        function: Callable[..., T],
-        *arguments: object,
-        stop: Callable[[], None] = lambda: None,
-    ) -> T:
+    async def run(self, turn: Turn, function: Callable[..., T], *arguments: object) -> T:
         """Return the value of `function(*arguments)`, called in a worker once it is its turn.
 
-        Cancelling this call ends the work: `stop` asks the job to end itself, and a worker that has
-        not come back shortly after is killed.
+        Cancelling this call ends the work: the job is asked to end itself, and a worker that has
+        not come back shortly after is killed. However it ends, no worker is in the job after it.
 
         Raises:
             what the function raises (ServiceError as it is, anything else as worker.JobFaultError);
@@ -135,125 +169,108 @@ class Workers:
             JobTimeout: it ran longer than these; its worker is killed.
             WorkerDied: the process ended.
         """
-        pool = await self._come(turn)
-        turn.began = time.monotonic()
+        process = await self._come(turn)
+        process.progress.clear()
+        turn.began, turn.progress = time.monotonic(), process.progress
+        future = _scheduled(process.pool, function, *arguments)
+        why = None
         try:
-            future = _scheduled(pool, function, *arguments)
-            value = await _result(pool, future, self._seconds)
+            return await _result(process.pool, future, self._seconds)
         except asyncio.CancelledError:
-            stop()
-            self._in_background(self._wind_down(pool, future))  # pyright: ignore[reportPossiblyUnboundVariable]
+            process.progress.stop()
+            await _whole(asyncio.wait({future}, timeout=GRACE_SECONDS))
+            why = "stopped" if not future.done() or _lost(future) else None
             raise
         except (JobTimeout, WorkerDied) as error:
-            self._replace(pool, error.code)
+            why = error.code
             raise
-        except BaseException:
-            self._let_go(pool)
-            raise
-        self._let_go(pool)
-        return value
+        finally:
+            if why is None:
+                self._let_go(process)
+            else:
+                process.warm = False
+                process.broken.set_result(why)
+                await _whole(process.ended.wait())
 
-    async def _come(self, turn: Turn) -> ProcessPool:
+    async def _come(self, turn: Turn) -> _Process:
         try:
             async with asyncio.timeout(self._seconds):
-                return await turn.pool
+                return await turn.process
         except BaseException as error:
             if turn in self._waiting:
                 self._waiting.remove(turn)
-            elif turn.pool.done() and not turn.pool.cancelled():
+            elif turn.process.done() and not turn.process.cancelled():
                 # Its turn came in the same moment.
-                self._let_go(turn.pool.result())
+                self._let_go(turn.process.result())
             if isinstance(error, TimeoutError):
                 raise BusyError("no worker became free in time", retry_after=5) from error
             raise
 
     def _grant(self) -> None:
         """Give every free worker that lives to the first in line whose client may hold one more."""
-        for pool in [pool for pool in self._free if not pool.active]:
-            self._free.remove(pool)
-            self._replace(pool, "idle")
+        free = [each for each in self._processes if each.holder is None and each.pool.active]
         for turn in tuple(self._waiting):
-            if not self._free:
-                return
-            if self.held[turn.client] < self._most and not turn.pool.done():
+            if free and self.held[turn.client] < self._most and not turn.process.done():
                 self._waiting.remove(turn)
-                pool = self._free.pop(0)
-                self._holders[pool] = turn.client
-                self.held[turn.client] += 1
-                turn.pool.set_result(pool)
+                process = free.pop(0)
+                process.holder = turn.client
+                turn.process.set_result(process)
 
-    def _let_go(self, pool: ProcessPool) -> None:
+    def _let_go(self, process: _Process) -> None:
         """Take back a worker."""
-        self._forgive(self._holders.pop(pool, ""))
-        self._free.append(pool)
+        process.holder = None
         self._grant()
 
-    def _forgive(self, client: str) -> None:
-        self.held[client] -= 1
-        self.held += Counter()
+    async def _keep_one(self) -> None:
+        """Keep a process, and another one in its place whenever it breaks.
 
-    async def _watch(self) -> None:
-        """Replace those that die while they are idle: with no request to find it, none would be."""
+        Until that is there, the client whose job broke the last one holds it.
+        """
+        holder, progress = "", Progress()
         while True:
-            await asyncio.sleep(WATCH_SECONDS)
-            self._grant()
-
-    async def _wind_down(self, pool: ProcessPool, future: asyncio.Future[Any]) -> None:
-        """Give a job that nobody wants the time to end itself."""
-        await asyncio.wait({future}, timeout=GRACE_SECONDS)
-        if future.done() and not _lost(future):
-            self._let_go(pool)
-        else:
-            self._replace(pool, "stopped")
-
-    def _replace(self, pool: ProcessPool, cause: str) -> None:
-        """End a process and start another, which its client holds until it is there."""
-        self._warm.discard(pool)
-        if not self._stopping:
-            self._replaced(cause)
-            self._in_background(self._add(self._holders.pop(pool, ""), pool))
-
-    async def _add(self, holder: str, instead: ProcessPool | None = None) -> None:
-        """Start a process, and put it among the free ones once it has warmed up."""
-        while True:
-            if instead is not None:
-                await asyncio.shield(self._end(instead))
-                self._pools.discard(instead)
-                del self._ends[instead]
-            pool = ProcessPool(
-                max_workers=1,
-                initializer=worker.prepare,
-                # Spawn, not fork: the server has threads, and a fork of them may deadlock.
-                context=multiprocessing.get_context("spawn"),
-            )
-            self._pools.add(pool)
+            process = _Process(holder, progress)
+            self._processes.append(process)
             try:
-                await _result(pool, _scheduled(pool, self._warm_up), WARM_UP_SECONDS)
-                self._warm.add(pool)
-            except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
-                # What a disk had no room for, say, it may have soon.
-                log.warning("a worker did not start: %s", _reason(error))
-                self._replaced("start")
+                await self._warmed_up(process)
+                while not process.broken.done():
+                    await asyncio.wait({process.broken}, timeout=WATCH_SECONDS)
+                    # With no request to find one that died while it was free, none would be.
+                    if process.holder is None and not process.pool.active:
+                        process.broken.set_result("idle")
+            finally:
+                await _whole(process.end())
+                self._processes.remove(process)
+            holder = process.holder or ""
+            self._replaced(process.broken.result())
+            if process.broken.result() == "start":
                 await asyncio.sleep(RESTART_SECONDS)
-                instead = pool
-                continue
-            except Exception as error:
-                # A model does not load, say: the process serves what needs none.
-                log.warning("a worker did not warm up: %s", error)
-            self._holders[pool] = holder
-            self._let_go(pool)
+
+    async def _warmed_up(self, process: _Process) -> None:
+        try:
+            await _result(process.pool, _scheduled(process.pool, self._warm_up), WARM_UP_SECONDS)
+            process.warm = True
+        except (JobTimeout, WorkerDied, worker.JobFaultError) as error:
+            # What a disk had no room for, say, it may have soon.
+            log.warning("a worker did not start: %s", _reason(error))
+            process.broken.set_result("start")
             return
+        except Exception as error:
+            # A model does not load, say: the process serves what needs none.
+            log.warning("a worker did not warm up: %s", error)
+        self._let_go(process)
 
-    def _end(self, pool: ProcessPool) -> asyncio.Task[None]:
-        """End a process, once: pebble may hang where two threads do."""
-        if pool not in self._ends:
-            self._ends[pool] = asyncio.get_running_loop().create_task(_end(pool))
-        return self._ends[pool]
 
-    def _in_background(self, work: Coroutine[object, object, None]) -> None:
-        task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+async def _whole(work: Coroutine[Any, Any, object]) -> None:
+    """Await what must not be left half done, and only then be cancelled."""
+    task = asyncio.ensure_future(work)
+    cancelled = None
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            cancelled = error
+    if cancelled is not None:
+        raise cancelled
 
 
 def _scheduled(
@@ -266,7 +283,10 @@ def _scheduled(
             future = asyncio.wrap_future(pool.schedule(worker.call, args=(function, *arguments)))
     except (RuntimeError, OSError) as error:
         # The process could not be started, or has died since the pool was looked at.
-        raise WorkerDied("no worker process could be started") from error
+        future = asyncio.get_running_loop().create_future()
+        died = WorkerDied("no worker process could be started")
+        died.__cause__ = error
+        future.set_exception(died)
     # What comes after everybody has gone is nobody's surprise.
     future.add_done_callback(_lost)
     return future
@@ -302,17 +322,3 @@ def _reason(error: BaseException) -> BaseException:
 def _lost(future: asyncio.Future[Any]) -> bool:
     """Return whether the process ended instead of answering."""
     return future.cancelled() or isinstance(future.exception(), (ProcessExpired, BrokenProcessPool))
-
-
-async def _end(pool: ProcessPool) -> None:
-    """End a process; SIGTERM at once, SIGKILL where that does not do."""
-
-    def end() -> None:
-        pool.stop()
-        pool.join()
-
-    try:
-        await asyncio.to_thread(end)
-    except RuntimeError:
-        # No thread is left to wait in, and nothing else would start the next process.
-        end()

@@ -1,26 +1,21 @@
-"""Progress of a job, in a page of memory that its worker writes and the server reads.
+"""Progress of a job, in memory that its worker writes and the server reads.
 
 Nothing is sent, so nothing waits: a worker inside one long numpy call and a server with a thousand
-clients hinder each other in nothing. The other way round the page carries one word: to stop.
+clients hinder each other in nothing. The other way round it carries one word: to stop.
 """
 
 from __future__ import annotations
 
-import mmap
-import os
-from contextlib import ExitStack
+import multiprocessing
+from contextvars import ContextVar
 
-from ..errors import NoStorageError, ServiceError
-from . import memory_file
-from .memory_file import FileName, MemoryFile
+from ..errors import ServiceError
 
 STAGES = ("read", "weld", "refine", "attributes", "write")
 
 _SCALE = 10**9
-_WORDS = 3
-_SIZE = 8 * _WORDS
 # Which word is what; the stage is a number into STAGES, plus one, and the share a whole number.
-_STAGE, _DONE, _STOP = range(_WORDS)
+_STAGE, _DONE, _STOP = range(3)
 
 
 class JobStopped(ServiceError):  # noqa: N818
@@ -31,27 +26,15 @@ class JobStopped(ServiceError):  # noqa: N818
     title = "The job was stopped"
 
 
-class ProgressPage:
-    """The server's side of the page. Raises NoStorageError where there is no room for one."""
+class Progress:
+    """Progress of a worker process in its job; the process is given it when it starts."""
 
     def __init__(self) -> None:
-        with ExitStack() as held:
-            self.file = held.enter_context(MemoryFile())
-            self.file.append(bytes(_SIZE))
-            try:
-                self._map = mmap.mmap(self.file.descriptor, _SIZE)
-            except OSError as error:
-                raise NoStorageError(f"no page can be mapped: {error.strerror}") from error
-            held.pop_all()
-        self._words = memoryview(self._map).cast("q")
+        self._words = multiprocessing.get_context("spawn").RawArray("q", 3)
 
-    def __enter__(self) -> ProgressPage:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._words.release()
-        self._map.close()
-        self.file.close()
+    def clear(self) -> None:
+        """Forget the job before."""
+        self._words[:] = [0, 0, 0]
 
     @property
     def stage(self) -> str | None:
@@ -65,39 +48,22 @@ class ProgressPage:
         return min(max(self._words[_DONE] / _SCALE, 0.0), 1.0)
 
     def stop(self) -> None:
-        """Ask the worker to end the job where it next looks."""
+        """Ask the worker to end the job where it next reports."""
         self._words[_STOP] = 1
 
-
-class Reporter:
-    """The worker's side of the page, open until the end of a `with` block."""
-
-    def __init__(self, name: FileName) -> None:
-        descriptor = memory_file.opened(name, os.O_RDWR)
-        try:
-            self._map = mmap.mmap(descriptor, _SIZE)
-        finally:
-            os.close(descriptor)
-        self._words = memoryview(self._map).cast("q")
-
-    def __enter__(self) -> Reporter:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        # A map has a descriptor of its own.
-        self._words.release()
-        self._map.close()
-
-    def stage(self, name: str) -> None:
+    def begin(self, stage: str) -> None:
         """Begin a stage. Raises JobStopped."""
-        self._check()
-        self._words[_STAGE] = 1 + STAGES.index(name)
+        self._report(_STAGE, 1 + STAGES.index(stage))
 
     def reach(self, share: float) -> None:
         """Take note that so much of the job is done, 0 … 1. Raises JobStopped."""
-        self._check()
-        self._words[_DONE] = round(share * _SCALE)
+        self._report(_DONE, round(share * _SCALE))
 
-    def _check(self) -> None:
+    def _report(self, word: int, value: int) -> None:
         if self._words[_STOP]:
             raise JobStopped("the job was stopped")
+        self._words[word] = value
+
+
+# That of this process, in a worker.
+PROGRESS: ContextVar[Progress] = ContextVar("progress")

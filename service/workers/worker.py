@@ -8,7 +8,6 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from typing import TypeVar
 from .. import log_lines
 from ..errors import ServiceError
 from ..log_lines import REQUEST_ID
+from .progress import PROGRESS, Progress
 
 T = TypeVar("T")
 
@@ -34,8 +34,9 @@ class JobFaultError(Exception):
     """A fault of ours inside a job; the text is the worker's traceback, for the log only."""
 
 
-def prepare() -> None:
+def prepare(progress: Progress) -> None:
     """Set up a fresh worker process."""
+    PROGRESS.set(progress)
     # A Python handler would wait for the next bytecode, and one numpy call may take seconds.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     log_lines.configure()
@@ -97,9 +98,8 @@ def rare_searches() -> Iterator[None]:
 
 def give_back() -> None:
     """Return freed memory, which glibc keeps for the next job, to the system."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if trim is not None:
-        trim(0)
+    # Only glibc has it.
+    getattr(ctypes.CDLL(None), "malloc_trim", bool)(0)
 
 
 @contextmanager

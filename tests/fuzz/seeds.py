@@ -15,6 +15,8 @@ import numpy as np
 import trimesh
 
 from service.bodies.media import GLB, GLTF, MEDIA_TYPES
+from service.meshfiles.formats import write
+from service.meshfiles.mesh_file import of_triangles
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 
@@ -72,6 +74,7 @@ def mesh_files():
         "text ply": ("ply", solid.export(file_type="ply", encoding="ascii")),
         "stl": ("stl", bytes(solid.export(file_type="stl"))),
         "text stl": ("stl", solid.export(file_type="stl_ascii").encode()),
+        "3mf": ("3mf", write(of_triangles(solid.vertices, solid.faces), "3mf")),
     }
     return [Seed(name, MEDIA_TYPES[kind], body) for name, (kind, body) in bodies.items()]
 

@@ -46,7 +46,7 @@ def samples() -> list[Sample]:
             _sample(f"zip-{number}", "application/zip", _zip(gltf)),
             _sample(f"form-{number}", MULTIPART, _form(glb)),
         ]
-        for kind in ("obj", "ply", "stl", "off"):
+        for kind in ("obj", "ply", "stl", "off", "3mf"):
             made.append(_sample(f"{kind}-{number}", f"model/{kind}", write(mesh, kind)))
     return made
 

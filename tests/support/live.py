@@ -26,11 +26,12 @@ def local(app: ASGIApp, **options: Any) -> TestClient:
 @contextmanager
 def served(
     job: Callable[[Work], Done] = jobs.obey,
+    warm_up: Callable[[Any], None] | None = jobs.no_warm_up,
     **settings: Any,
 ) -> Iterator[tuple[str, int]]:
     """Host and port of a server whose workers obey their request's body, or do another job."""
     chosen = Settings(**{"port": 0} | settings)
-    app = create_app(chosen, job=job, warm_up=jobs.no_warm_up)
+    app = create_app(chosen, job=job, warm_up=warm_up)
     server = Server(configuration(app, chosen))
     thread = threading.Thread(target=server.run)
     thread.start()

@@ -22,7 +22,7 @@ from service.errors import GltfError, LimitError, NoModelError, UnreadableError
 from service.options import Limits
 from service.workers import memory_file
 from service.workers.jobs import Done, Work, hold_model, job_memory
-from service.workers.progress import Reporter
+from service.workers.progress import PROGRESS
 
 if TYPE_CHECKING:
     from pns_common.model.session import Model
@@ -54,8 +54,7 @@ def fails_to_warm_up(model: object) -> None:
 
 def obey(work: Work) -> Done:
     """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
-    reporter = Reporter(work.page)
-    body = memory_file.read(work.body)
+    body = Path(work.body).read_bytes()
     word, _, argument = body[:300].decode(errors="replace").partition(" ")
     match word:
         case "sleep":
@@ -86,7 +85,7 @@ def obey(work: Work) -> Done:
             with job_memory(Limits(max_memory_bytes=int(argument))):
                 bytearray(int(argument) + 2**31)
         case "steps":
-            take_steps(reporter, Path(argument.strip()))
+            take_steps(Path(argument.strip()))
         case "log":
             logging.getLogger("pns.service").warning("a job says\nsomething")
         case "pid":
@@ -113,21 +112,22 @@ def files_of_at_most(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def take_steps(reporter: Reporter, folder: Path) -> None:
+def take_steps(folder: Path) -> None:
     """Three quarters of a job; after each it waits until it may go on, or is stopped."""
-    reporter.stage("refine")
+    progress = PROGRESS.get()
+    progress.begin("refine")
     for number in (1, 2, 3):
-        reporter.reach(number / 4)
+        progress.reach(number / 4)
         tell(folder / f"took-{number}")
         while not (folder / f"go-{number}").exists():
             time.sleep(0.002)
-            reporter.reach(number / 4)
+            progress.reach(number / 4)
 
 
 def digest(work: Work) -> Done:
     """The body's SHA-256; it dawdles `before` and `after` it writes, as the content type says."""
     told = dict(part.split("=") for part in work.content_type.split("; ")[1:])
-    body = memory_file.read(work.body)
+    body = Path(work.body).read_bytes()
     time.sleep(float(told["before"]))
     fill(work, hashlib.sha256(body).hexdigest().encode())
     time.sleep(float(told["after"]))
@@ -141,7 +141,7 @@ def digest_step_by_step(work: Work) -> Done:
     """
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     told = Path(work.content_type.partition("folder=")[2])
-    body = memory_file.read(work.body)
+    body = Path(work.body).read_bytes()
     tell(told / "read")
     wait_for(told / "may-write")
     fill(work, hashlib.sha256(body).hexdigest().encode())

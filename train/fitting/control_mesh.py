@@ -77,7 +77,7 @@ class ControlMesh:
         topology, points = level.topology, np.array(level.points)
         self.points, self.edges = torch.from_numpy(points), _long(topology.edges)
         self.directed = Directed.of(topology)
-        self.features = torch.from_numpy(directed_features(level, 0, len(topology.edges)))
+        self.features = torch.from_numpy(by_way(directed_features(level, 0, len(topology.edges))))
         self.axes = torch.from_numpy(_axes(level))
         split = self.base.split(topology, Blocks(), inherit=False)
         self._measure_gates(level, split.vertex_count)
@@ -224,7 +224,12 @@ def _axes(level: Level) -> Float[np.ndarray, "D 3 3"]:
             *(mesh.edges, mesh.half_edges, mesh.edge_class, heads[axis], 0, count),
             *(np.empty((count, 3)), made[axis], np.empty(count)),
         )
-    return np.ascontiguousarray(made.transpose(1, 0, 2))
+    return by_way(np.ascontiguousarray(made.transpose(1, 0, 2)))
+
+
+def by_way(rows: Float[np.ndarray, "D ..."]) -> Float[np.ndarray, "D ..."]:
+    """Return the library's rows of directed edges as networks here read them: all a → b first."""
+    return np.concatenate([rows[0::2], rows[1::2]])
 
 
 def _halves(

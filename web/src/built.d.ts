@@ -13,6 +13,7 @@ declare module "three/addons/libs/fflate.module.js" {
     data: Uint8Array,
     done: (error: Error | null, files: Unzipped) => void,
   ): void;
+  export function unzipSync(data: Uint8Array): Unzipped;
 }
 
 declare module "gltf-validator" {

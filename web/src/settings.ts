@@ -76,7 +76,7 @@ export const DEFAULTS: Settings = {
 
 export type Diagnostics = "summary" | "full";
 export type Compression = "none" | "meshopt" | "draco";
-export type Format = "glb" | "obj" | "ply" | "stl" | "off";
+export type Format = "glb" | "obj" | "ply" | "stl" | "off" | "3mf";
 
 /** How an answer is to be written. */
 export interface Writing {

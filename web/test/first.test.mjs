@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import { describe, test } from "node:test";
+import { strToU8, zipSync } from "three/addons/libs/fflate.module.js";
 import { bodyOf, choose, downloaded, hold, noBrowser, picture, settled } from "./support/browser.mjs";
 import { positions, read, rigged, write } from "./support/glb.mjs";
 import { CUBE, CUBE_OF_TRIANGLES } from "./support/solids.mjs";
@@ -76,6 +77,7 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
   for (const [file, format, type] of [
     [{ ...TETRAHEDRON, name: "a.obj" }, "obj", "model/obj"],
     [off(), "off", "model/off"],
+    [print(), "3mf", "model/3mf"],
     [{ ...example, name: "a.glb" }, "glb", "model/gltf-binary"],
   ]) {
     test(`${file.name} comes back in its own format, and in others on demand`, async () => {
@@ -90,6 +92,16 @@ describe("the first minute", { skip: noBrowser, timeout: 1_800_000 }, () => {
       }
     });
   }
+
+  test("the parts of a 3MF are shown where its result is", async () => {
+    const page = await visit({ hash: "#levels=1" });
+    await choose(page, print());
+    await settled(page);
+    assert.match(await page.textContent("#label-left"), /8 faces/);
+    await page.locator("#promises", { hasText: "measured from each surface" }).waitFor();
+    const [, most] = /At most ([\d.]+)\u00a0%/.exec(await page.textContent("#promises"));
+    assert.ok(Number(most) < 30, most);
+  });
 
   test("an upload that shrinks by compression is sent compressed", async () => {
     const page = await visit({ hash: "#levels=1" });
@@ -458,6 +470,26 @@ function advised(body, advice) {
 }
 
 /** The tetrahedron as OFF. */
+/** A sphere of 3MF in a part of the package of its own, in inches, mirrored and moved. */
+function print() {
+  const core = 'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"';
+  const production = 'xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"';
+  const ends = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+  const faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+  const mesh = `<mesh><vertices>${ends.map(([x, y, z]) => `<vertex x="${x}" y="${y}" z="${z}"/>`).join("")}</vertices>
+    <triangles>${faces.map(([a, b, c]) => `<triangle v1="${a}" v2="${b}" v3="${c}"/>`).join("")}</triangles></mesh>`;
+  const files = {
+    "_rels/.rels": `<Relationships><Relationship Target="/3D/a.model"
+      Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>`,
+    "3D/a.model": `<model unit="inch" ${core} ${production}><resources><object id="1"><components>
+      <component p:path="/3D/b.model" objectid="7" transform="-1 0 0 0 1 0 0 0 3 5 0 0"/></components></object>
+      </resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 0 9 0"/></build></model>`,
+    "3D/b.model": `<model ${core}><resources><object id="7">${mesh}</object></resources><build/></model>`,
+  };
+  const bytes = zipSync(Object.fromEntries(Object.entries(files).map(([name, text]) => [name, strToU8(text)])));
+  return { name: "a.3mf", mimeType: "", buffer: Buffer.from(bytes) };
+}
+
 function off() {
   const text = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
   return { name: "a.off", mimeType: "", buffer: Buffer.from(text) };

@@ -25,11 +25,11 @@ from ...meshes.split_connectivity import blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
-from .columns import SkinAndMorph, skin_attributes
 from .control_mesh import ControlMesh, refined_ids, slices
 from .mesh_refine import RefinedMesh
 from .normals import Shading, safe_unit, shade
 from .selection import Cut, cut_triangles, keep_still, with_still
+from .skin import SkinAndMorph, skin_attributes
 
 # Share of the progress that normals take.
 SHADING = 0.85

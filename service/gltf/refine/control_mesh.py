@@ -19,8 +19,8 @@ from ...meshes.split_connectivity import blocks_of
 from ...meshes.weld import WHOLE, Weld, weld, weld_by_label, weld_within
 from ...options import Options
 from ..read.primitives import TrianglePrimitive
-from .columns import SkinAndMorph, read_skin_and_morph
 from .polygons import Found, Polygons, polygons_of
+from .skin import SkinAndMorph, read_skin_and_morph
 
 # Exporters compute the two sides of a UV seam apart and round differently, in real files by up to
 # about 0.01°. Normals within 0.1° are one; hard edges have degrees.

@@ -24,9 +24,10 @@ from pns_common.schemes.matrix import SubdivisionMatrix
 from ...course import Course
 from ...errors import UnrefinableError
 from ...options import Options
-from .columns import SkinAndMorph, refined_skin_and_morph
+from .columns import refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
+from .skin import SkinAndMorph
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 

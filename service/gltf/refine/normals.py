@@ -24,8 +24,8 @@ from pns_common.parallel import Blocks, available_threads, no_progress
 from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
-from .columns import SkinAndMorph
 from .control_mesh import ControlMesh, slices
+from .skin import SkinAndMorph
 
 # Share of the progress that finding groups takes.
 GROUPING = 0.25

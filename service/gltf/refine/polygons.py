@@ -30,7 +30,7 @@ from ...meshes.barycentric_grid import at_quad_points
 from ...meshes.weld import canonical_zero
 from ...options import PolygonRule
 from ..read.primitives import TrianglePrimitive, distinct_corners
-from .columns import read_skin_and_morph
+from .skin import read_skin_and_morph
 
 # Authors' quads are rarely plane: at this angle between their triangles nearly all are found.
 FLAT = np.cos(np.radians(8.0))

@@ -37,7 +37,7 @@ from .changes import (
     near_misses,
     opposed_normals,
 )
-from .columns import COLUMNS, skin_sets
+from .columns import COLUMNS
 from .control_mesh import ControlMesh, Parts, control_mesh, slices
 from .mesh_refine import (
     RefinedMesh,
@@ -46,6 +46,7 @@ from .mesh_refine import (
     sharp_after,
 )
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
+from .skin import skin_sets
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
-from starlette.types import ASGIApp, Receive, Scope, Send
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from starlette.types import Scope
 
 from ...errors import UnauthorizedError
-from .. import problems
 from .clients import Client
 
-PREFIX = "pns"
 NAME = r"[a-z0-9][a-z0-9-]{0,62}"
 
 
@@ -35,11 +33,18 @@ class Entry(BaseModel):
     faces_per_minute: Annotated[float, Field(gt=0)] | None = None
 
 
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    # Without one nobody could ask for anything.
+    key: Annotated[list[Entry], Field(min_length=1)]
+
+
 def new_key(name: str) -> str:
     """Make a fresh key of that name. Raises KeysError where it cannot be one."""
     if not re.fullmatch(NAME, name):
         raise KeysError(f"{name!r}: a name is 1 to 63 of a-z, 0-9 and -, not - first")
-    return f"{PREFIX}_{name}_{secrets.token_urlsafe(32)}"
+    return f"pns_{name}_{secrets.token_urlsafe(32)}"
 
 
 def hash_of(key: str) -> str:
@@ -58,24 +63,17 @@ def read_keys(path: Path) -> list[Entry]:
     """
     said = f"PNS_KEYS_FILE: {path}"
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-        entries = _ENTRIES.validate_python(data.get("key", []))
+        entries = _File.model_validate(tomllib.loads(path.read_text(encoding="utf-8"))).key
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         text = error.strerror if isinstance(error, OSError) else error
         raise KeysError(f"{said}: {text}") from error
     except ValidationError as error:
         first = error.errors()[0]
-        number, *fields = first["loc"] or ("",)
-        if not fields:
-            raise KeysError(f"{said}: entries are [[key]] tables with name and hash") from error
-        where = ".".join(map(str, fields))
-        raise KeysError(f"{said}: entry {int(number) + 1}: {where}: {first['msg']}") from error
-    if unknown := sorted(set(data) - {"key"}):
-        raise KeysError(f"{said}: {unknown[0]} is not known; entries are [[key]] tables")
+        where = ".".join(str(part + 1) if isinstance(part, int) else part for part in first["loc"])
+        hint = "it holds [[key]] tables with name and hash, one at least"
+        raise KeysError(f"{said}: {where}: {first['msg']}; {hint}") from error
     if len({entry.hash for entry in entries}) < len(entries):
         raise KeysError(f"{said}: two entries have one hash")
-    if not entries:
-        raise KeysError(f"{said}: there is no [[key]] in it, so nobody could ask for anything")
     return entries
 
 
@@ -87,8 +85,6 @@ def toml_entry(entry: Entry) -> str:
     return "\n".join(lines)
 
 
-_ENTRIES = TypeAdapter(list[Entry])
-
 _BEARER = re.compile(r"(?i:bearer) +([!-~]+)")
 # Routes that anybody may ask: they cost nothing and say nothing of anyone. A key that is sent to
 # them is checked all the same.
@@ -97,22 +93,13 @@ OPEN_FOLDERS = ("/assets/", "/docs/")
 
 
 class Bearer:
-    """ASGI layer that finds the client behind a key, and refuses those without one."""
+    """Finds the client behind a key."""
 
-    def __init__(self, app: ASGIApp, keys: Iterable[Entry]) -> None:
-        self.app = app
+    def __init__(self, keys: Iterable[Entry]) -> None:
         self._keys = {entry.hash: entry for entry in keys}
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        try:
-            self._admit(scope)
-        except UnauthorizedError as error:
-            await problems.of_service_error(error)(scope, receive, send)
-            return
-        await self.app(scope, receive, send)
-
-    def _admit(self, scope: Scope) -> None:
+    def check(self, scope: Scope) -> None:
+        """Note whose request it is. Raises UnauthorizedError."""
         sent = [value for name, value in scope["headers"] if name == b"authorization"]
         if not sent:
             path = scope["path"].removeprefix(scope.get("root_path", ""))

@@ -12,11 +12,10 @@ from __future__ import annotations
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Scope
 
 from ...errors import ServiceError
 from ...settings import Settings
-from .. import problems
 
 # What these ask for costs little, and no page of another origin is shown the answer.
 SAFE = frozenset({"GET", "OPTIONS"})
@@ -53,34 +52,25 @@ def _is_address(host: str) -> bool:
 
 
 class Origins:
-    """ASGI layer that refuses foreign names, and work that foreign pages ask for.
+    """Refuses foreign names, and work that foreign pages ask for.
 
     Clients that are no browsers send no origin, and are not asked for one.
     """
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
-        self.app = app
+    def __init__(self, settings: Settings) -> None:
         self.named = frozenset(settings.cors_origins)
         self.hosts = ("localhost", "*.localhost", settings.host.lower(), *settings.hosts)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
+    def check(self, scope: Scope) -> None:
+        """Check the head of a request. Raises UnknownHostError, ForeignOriginError."""
         sent = {name: value.decode("latin-1") for name, value in scope["headers"]}
-        try:
-            self._check(scope["method"], sent)
-        except ServiceError as error:
-            await problems.of_service_error(error)(scope, receive, send)
-            return
-        await self.app(scope, receive, send)
-
-    def _check(self, method: str, sent: dict[bytes, str]) -> None:
         host = _host(f"//{sent.get(b'host', '')}")
         # HTTP/1.0 may leave it out; browsers do not.
         if b"host" in sent and not self._is_own(host):
             raise UnknownHostError(
                 "the Host is no address, not localhost, and none of the names in PNS_HOSTS"
             )
-        if method not in SAFE and not self._may_ask(sent, host):
+        if scope["method"] not in SAFE and not self._may_ask(sent, host):
             raise ForeignOriginError(
                 "a page of another origin asks; PNS_CORS_ORIGINS names those that may"
             )

@@ -22,10 +22,10 @@ def part(head: bytes, content: bytes) -> bytes:
 )
 def test_the_content_comes_out_as_it_went_in(content: bytes) -> None:
     typed = HEAD + b"Content-Type: application/octet-stream\r\n"
-    assert sent_files(part(typed, content) + b"--X--\r\n", TYPE).main == File("cow.glb", content)
+    assert sent_files(part(typed, content) + b"--X--\r\n", TYPE)[0] == File("cow.glb", content)
     # Some clients name no file.
     bare = HEAD.replace(b'; filename="cow.glb"', b"")
-    assert sent_files(part(bare, content) + b"--X--\r\n", TYPE).main == File("", content)
+    assert sent_files(part(bare, content) + b"--X--\r\n", TYPE)[0] == File("", content)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def other(name: str, filename: str, content: bytes) -> bytes:
 
 def test_other_parts_are_found_by_their_name_or_their_file_name() -> None:
     body = part(HEAD, b"{}") + other("tex/a.png", "a.png", b"1") + other("b", "b.bin", b"2")
-    siblings = sent_files(body + b"--X--\r\n", TYPE).siblings
+    siblings = sent_files(body + b"--X--\r\n", TYPE)[1]
     assert siblings.names == {"tex/a.png", "b"}
     for name, content in [("tex/a.png", b"1"), ("a.png", b"1"), ("b", b"2"), ("b.bin", b"2")]:
         sibling = siblings.find(name)
@@ -74,7 +74,7 @@ def test_other_parts_are_found_by_their_name_or_their_file_name() -> None:
 
 def test_a_file_name_that_two_parts_share_names_neither() -> None:
     body = part(HEAD, b"{}") + other("a", "x.bin", b"1") + other("b", "x.bin", b"2")
-    siblings = sent_files(body + b"--X--\r\n", TYPE).siblings
+    siblings = sent_files(body + b"--X--\r\n", TYPE)[1]
     assert siblings.find("x.bin") is None
 
 

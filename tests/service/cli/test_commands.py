@@ -195,7 +195,7 @@ def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
 def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
     code, out, err = pns("serve", "--host", "300.0.0.1", "--port", "0")
     assert (code, out) == (1, "")
-    assert "'300.0.0.1'" in err
+    assert "300.0.0.1" in err
     assert err.count("\n") == 1
 
 

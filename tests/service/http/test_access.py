@@ -9,10 +9,11 @@ import httpx2
 import pytest
 from starlette.responses import PlainTextResponse
 
-from service.http.access.keys import Entry, KeysError, hash_of, new_key, read_keys
+from service.http.access.keys import Entry, KeysError, hash_of, new_key
 from service.http.access.keys import toml_entry as written
 from service.http.access.origins import Origins
 from service.http.app import create_app
+from service.http.problems import Checked
 from service.settings import Settings
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local, served
@@ -89,13 +90,14 @@ def test_a_name_is_plain(name):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "there is no"),
-        ("key = 1", "entries are .*key"),
-        ("[[key]]\nname = 'a'\nhash = 'plain'", "PNS_KEYS_FILE: .* entry 1: hash"),
+        ("", "key: Field required; it holds"),
+        ("key = []", "key: .* 1 item"),
+        ("[[key]]\nname = 'a'\nhash = 'plain'", r"PNS_KEYS_FILE: .* key\.1\.hash"),
         ("[[key]]\nname = 'A'\nhash = 'plain'", "name"),
-        ("[[keys]]\nname = 'a'", "keys is not known"),
+        ("[[keys]]\nname = 'a'", r"holds \[\[key\]\]"),
         ("ENTRY\ncolour = 1", "colour"),
         ("not toml", "keys.toml"),
+        ("# Schl\xfcssel\n", r"keys\.toml: .*utf-8"),
         ("ENTRY\nENTRY", "two entries have one hash"),
         ("ENTRY\nfaces_per_minute = inf", "faces_per_minute"),
         ("ENTRY\nfaces_per_minute = 0", "faces_per_minute"),
@@ -104,16 +106,9 @@ def test_a_name_is_plain(name):
 def test_a_file_that_cannot_be_used_is_refused_at_start(tmp_path, text, reason):
     entry = written(Entry(name="a", hash=hash_of("x")))
     path = tmp_path / "keys.toml"
-    path.write_text(text.replace("ENTRY", entry))
+    path.write_text(text.replace("ENTRY", entry), encoding="latin-1")
     with pytest.raises(KeysError, match=reason):
         create_app(Settings(workers=1, keys_file=path))
-
-
-def test_a_file_that_is_no_text_is_refused_at_start(tmp_path):
-    path = tmp_path / "keys.toml"
-    path.write_bytes(b"# Schl\xfcssel\n")
-    with pytest.raises(KeysError, match=r"keys\.toml: .*utf-8"):
-        read_keys(path)
 
 
 def test_while_a_key_is_replaced_both_are_keys_of_one_client(tmp_path, caplog):
@@ -219,31 +214,27 @@ def test_the_routes_see_the_name_of_the_key(client, caplog):
     assert OTHER not in caplog.text
 
 
+EVERYBODY, NO_PROXY = ["everybody: no PNS_KEYS_FILE"], "no PNS_PROXIES are set"
+
+
 @pytest.mark.parametrize(
-    ("with_keys", "host", "said"),
+    ("with_keys", "settings", "open_to", "without_proxy"),
     [
-        (True, "127.0.0.1", ["the bearers of 2 keys"]),
-        (False, "0.0.0.0", ["everybody: no PNS_KEYS_FILE"]),
-        (False, "127.0.0.1", []),
+        (True, {}, ["the bearers of 2 keys"], False),
+        (False, {}, [], False),
+        (False, {"host": "0.0.0.0"}, EVERYBODY, True),
+        (False, {"host": "::", "proxies": "10.0.0.1"}, EVERYBODY, False),
     ],
 )
-def test_the_service_says_at_start_to_whom_it_is_open(keys_file, with_keys, host, said, caplog):
-    settings = Settings(workers=1, host=host, keys_file=keys_file if with_keys else None)
-    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
+def test_the_service_says_at_start_to_whom_it_is_open_and_what_it_leaves_to_a_proxy(
+    keys_file, with_keys, settings, open_to, without_proxy, caplog
+):
+    chosen = Settings(workers=1, keys_file=keys_file if with_keys else None, **settings)
+    app = create_app(chosen, job=jobs.obey, warm_up=jobs.no_warm_up)
     with caplog.at_level(logging.INFO), local(app):
         pass
-    assert re.findall(r"open to (.*?)(?: is set)?$", caplog.text, re.M) == said
-
-
-@pytest.mark.parametrize(
-    ("settings", "says"),
-    [({}, False), ({"host": "0.0.0.0"}, True), ({"host": "::", "proxies": "10.0.0.1"}, False)],
-)
-def test_the_service_says_at_start_what_it_leaves_to_a_proxy(settings, says, caplog):
-    app = create_app(Settings(workers=1, **settings), job=jobs.obey, warm_up=jobs.no_warm_up)
-    with local(app):
-        pass
-    assert ("no PNS_PROXIES are set" in caplog.text) is says
+    assert re.findall(r"open to (.*?)(?: is set)?$", caplog.text, re.M) == open_to
+    assert (NO_PROXY in caplog.text) is without_proxy
 
 
 # Other origins
@@ -289,7 +280,7 @@ def test_a_form_of_another_origin_is_refused_before_its_work(sent, origins, stat
         await PlainTextResponse("done")(scope, receive, send)
 
     settings = Settings(cors_origins=origins, hosts="pns.example")
-    client = local(Origins(app, settings), base_url="http://pns.example")
+    client = local(Checked(app, Origins(settings).check), base_url="http://pns.example")
     assert client.post("/report", headers=sent).status_code == status
     assert asked == ["POST"] * (status == 200)
     assert client.get("/models", headers=sent).status_code == 200

@@ -35,18 +35,12 @@ def request(address: tuple[str, int] | None, **state: object) -> Request:
         ("testclient", "address:testclient"),
     ],
 )
-def test_an_address_is_a_client_and_has_the_services_budget(address: str, client: str) -> None:
+def test_who_sends_no_key_is_the_client_of_its_address(address: str, client: str) -> None:
     settings = Settings(faces_per_minute=77)
     assert client_of(request((address, 1)), settings) == Client(client, 77)
-
-
-def test_a_request_from_nowhere_is_a_client_too() -> None:
-    assert client_of(request(None), Settings()).id == "address:"
-
-
-def test_a_client_that_was_found_before_stands() -> None:
+    assert client_of(request(None), settings) == Client("address:", 77)
     named = Client("key:mine", 5)
-    assert client_of(request(("192.0.2.7", 1), client=named), Settings()) is named
+    assert client_of(request((address, 1), client=named), settings) is named
 
 
 def test_a_client_has_so_many_places_and_all_together_so_many() -> None:
@@ -65,33 +59,30 @@ def test_a_client_has_so_many_places_and_all_together_so_many() -> None:
         assert places.taken == {"a": 1}
 
 
-def test_a_slow_reader_gives_its_place_to_a_client_who_holds_less() -> None:
+@pytest.mark.anyio
+async def test_a_slow_reader_gives_its_place_to_a_client_who_holds_less() -> None:
     """Two addresses that hardly read their answers would else close the service."""
+    places, ended = Places(4, own=3), []
 
-    async def scenario() -> None:
-        places, ended = Places(4, own=3), []
+    async def takes(client: str) -> None:
+        end = asyncio.timeout(None)
+        with places.held(client), places.taking(client, end):
+            try:
+                async with end:
+                    await asyncio.sleep(60)
+            except TimeoutError:
+                ended.append(client)
 
-        async def takes(client: str) -> None:
-            end = asyncio.timeout(None)
-            with places.held(client), places.taking(client, end):
-                try:
-                    async with end:
-                        await asyncio.sleep(60)
-                except TimeoutError:
-                    ended.append(client)
-
-        slow = [asyncio.create_task(takes(client)) for client in "aaab"]
-        await asyncio.sleep(0)
-        with pytest.raises(BusyError), places.held("b"), places.held("b"), places.held("b"):
-            pass
-        with places.held("honest"):
-            await asyncio.sleep(0.01)
-        assert ended == ["a"] * 2
-        for task in slow:
-            task.cancel()
-        await asyncio.gather(*slow, return_exceptions=True)
-
-    asyncio.run(scenario())
+    slow = [asyncio.create_task(takes(client)) for client in "aaab"]
+    await asyncio.sleep(0)
+    with pytest.raises(BusyError), places.held("b"), places.held("b"), places.held("b"):
+        pass
+    with places.held("honest"):
+        await asyncio.sleep(0.01)
+    assert ended == ["a"] * 2
+    for task in slow:
+        task.cancel()
+    await asyncio.gather(*slow, return_exceptions=True)
 
 
 def test_a_budget_refills_evenly_and_a_job_may_leave_a_debt() -> None:

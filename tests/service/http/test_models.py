@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -16,10 +15,8 @@ from fastapi.testclient import TestClient
 
 from pns_common.model.file import DEFAULT_MODEL, load_model
 from service.http.app import create_app
-from service.http.jobs import Service
 from service.meshfiles.example import part_glb
 from service.settings import Settings
-from service.workers.models import Catalogue
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import local
 from tests.support.networks import DEFAULT_CARD
@@ -45,29 +42,6 @@ def served(folder: Path, model: str | None = None) -> Iterator[TestClient]:
 def client(folder: Path) -> Iterator[TestClient]:
     with served(folder) as opened:
         yield opened
-
-
-def test_however_many_ask_at_first_one_worker_reads_the_catalogue() -> None:
-    class Counted:
-        reads = 0
-
-        def join(self, client: str) -> None:
-            pass
-
-        async def run(self, turn: None, read: Callable[[], Catalogue]) -> Catalogue:
-            self.reads += 1
-            await asyncio.sleep(0)
-            return read()
-
-    async def scenario() -> None:
-        workers, heard = Counted(), []
-        made = (Settings(), workers, jobs.obey, lambda: Catalogue(("a",), b"[]"), print)
-        service = Service(*made, heard.append)  # pyright: ignore
-        answers = await asyncio.gather(*(service.catalogue() for _ in range(20)))
-        assert {answer.names for answer in answers} == {("a",)}
-        assert (workers.reads, len(heard)) == (1, 1)
-
-    asyncio.run(scenario())
 
 
 def subdivide(client: TestClient, query: str) -> httpx2.Response:

@@ -1,23 +1,23 @@
 """The description of the service, and the clients that generators make of it."""
 
-import http.client
 import json
 import re
 import shutil
 import subprocess
-import threading
+import time
 from pathlib import Path
 
+import httpx2
 import pytest
 
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
-from service.http.server import Server, configuration
 from service.meshfiles.example import part_glb
 from service.settings import Settings
+from service.workers.jobs import subdivide
 from tests.support import node_tools
 from tests.support import stand_in_jobs as jobs
-from tests.support.live import local
+from tests.support.live import local, served
 
 ROOT = Path(__file__).resolve().parents[3]
 SUPPORT = ROOT / "tests" / "support"
@@ -32,26 +32,11 @@ def document():
 @pytest.fixture(scope="module")
 def address():
     """A server that really refines."""
-    settings = Settings(workers=1, port=0)
-    server = Server(configuration(create_app(settings), settings))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    pause = threading.Event()
-    while not server.started:
-        pause.wait(0.01)
-    host, port = server.servers[0].sockets[0].getsockname()
-    connection = http.client.HTTPConnection(host, port, timeout=600)
-    for _ in range(600):
-        connection.request("GET", "/readyz")
-        answer = connection.getresponse()
-        answer.read()
-        if answer.status == 200:
-            break
-        pause.wait(0.1)
-    connection.close()
-    yield f"http://{host}:{port}"
-    server.should_exit = True
-    thread.join()
+    with served(subdivide, warm_up=None, workers=1) as (host, port):
+        url = f"http://{host}:{port}"
+        while httpx2.get(f"{url}/readyz").status_code != 200:
+            time.sleep(0.1)
+        yield url
 
 
 def operations(document):
@@ -75,38 +60,22 @@ def test_every_route_says_what_it_does_and_stands_on_the_page(document):
         assert f"| `{name}" in page or f", `{name}" in page, name
 
 
-def test_there_is_one_schema_of_problems(document):
-    wanted = {"schema": {"$ref": "#/components/schemas/Problem"}}
+def test_every_operation_says_what_any_route_may_answer(document):
+    problem = {"schema": {"$ref": "#/components/schemas/Problem"}}
     for name, operation in operations(document):
-        for status, answer in operation["responses"].items():
-            if int(status) >= 400:
-                assert answer["content"] == {"application/problem+json": wanted}, (name, status)
-    assert "HTTPValidationError" not in document["components"]["schemas"]
-    assert json.dumps(document).count('"JSON pointer of the offending value"') == 1
-
-
-def test_what_any_route_may_answer_stands_with_each(document):
-    for name, operation in operations(document):
-        if "probes" not in operation.get("tags", ()):
-            assert {"401", "429", "503"} <= set(operation["responses"]), name
-
-
-def test_headers_that_clients_act_by_are_told(document):
-    for name, operation in operations(document):
+        is_probe = "probes" in operation.get("tags", ())
+        assert is_probe or {"401", "429", "503"} <= set(operation["responses"]), name
+        assert operation["security"] == ([] if is_probe else [{}, {"key": []}]), name
         for status, answer in operation["responses"].items():
             told = set(answer["headers"])
             assert "X-Request-ID" in told, (name, status)
             assert ("Retry-After" in told) == (status in ("429", "503")), (name, status)
             assert ("WWW-Authenticate" in told) == (status == "401"), (name, status)
-
-
-def test_probes_need_no_key_and_the_document_says_where_the_service_is(document):
-    for name, operation in operations(document):
-        expected = [] if "probes" in operation.get("tags", ()) else [{}, {"key": []}]
-        assert operation["security"] == expected, name
+            if int(status) >= 400:
+                assert answer["content"] == {"application/problem+json": problem}, (name, status)
+    assert "HTTPValidationError" not in document["components"]["schemas"]
+    assert json.dumps(document).count('"JSON pointer of the offending value"') == 1
     assert document["servers"] == [{"url": "/"}]
-    app = create_app(Settings(workers=1, prefix="/tools/pns"), warm_up=jobs.no_warm_up)
-    assert local(app).get("/openapi.json").json()["servers"] == [{"url": "/tools/pns"}]
 
 
 def test_every_reference_leads_somewhere(document):

@@ -18,7 +18,8 @@ from service.http import answer as answers
 from tests.support.live import served
 
 GLB = {"Content-Type": "model/gltf-binary"}
-STREAM = GLB | {"Accept": "multipart/mixed"}
+MIXED = "multipart/mixed"
+STREAM = GLB | {"Accept": MIXED}
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +57,13 @@ def until(holds: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def begin(address: tuple[str, int], body: bytes) -> socket.socket:
+def begin(address: tuple[str, int], body: bytes, accept: str = MIXED) -> socket.socket:
     connection = socket.create_connection(address, timeout=600)
-    connection.sendall(
-        b"POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
-        b"Accept: multipart/mixed\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+    head = (
+        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
+        f"Accept: {accept}\r\nContent-Length: {len(body)}\r\n\r\n"
     )
+    connection.sendall(head.encode() + body)
     return connection
 
 
@@ -157,15 +159,16 @@ def test_429_for_more_than_a_client_may_have(
     until(lambda: client.post("/subdivide", content=b"x", headers=GLB).status_code == 200)
 
 
+@pytest.mark.parametrize("accept", [MIXED, "*/*"])
 @pytest.mark.parametrize("word", ["steps", "hold"])
 def test_who_leaves_frees_its_worker_and_memory(
-    address: tuple[str, int], client: httpx2.Client, tmp_path: Path, word: str
+    address: tuple[str, int], client: httpx2.Client, tmp_path: Path, word: str, accept: str
 ) -> None:
     """Also where its job does not look; a job may take an hour here."""
     for number in range(3):
         folder = tmp_path / str(number)
         folder.mkdir()
-        with begin(address, f"{word} {folder}".encode()):
+        with begin(address, f"{word} {folder}".encode(), accept):
             if word == "steps":
                 until((folder / "took-1").exists)
     until(lambda: client.post("/subdivide", content=b"here", headers=GLB).content == b"here")

@@ -137,7 +137,7 @@ def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
     assert "extras" not in tree_of(bare.content)["asset"]
 
 
-@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off"])
+@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off", "3mf"])
 def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
     client: TestClient, part: bytes, kind: str
 ) -> None:
@@ -196,7 +196,7 @@ def test_without_a_model_loop_still_works(part: bytes) -> None:
         assert client.get("/readyz").status_code == 503
 
 
-@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off"])
+@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off", "3mf"])
 def test_an_answer_in_another_format_is_what_the_command_writes(
     client: TestClient, target: Kind
 ) -> None:

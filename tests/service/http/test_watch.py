@@ -53,18 +53,16 @@ def test_a_sane_request_id_is_kept(client, sent, caplog):
     assert lines(caplog)[0]["request_id"] == sent
 
 
-@pytest.mark.parametrize("sent", ["", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "../a", "é"])
-def test_another_is_replaced(client, sent):
-    answer = client.get("/nothing", headers=[(b"x-request-id", sent.encode("latin-1"))])
+@pytest.mark.parametrize(
+    "sent", [*([each] for each in ("", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "é")), ["a", "b"]]
+)
+def test_others_are_replaced(client, sent):
+    headers = [(b"x-request-id", each.encode("latin-1")) for each in sent]
+    answer = client.get("/nothing", headers=headers)
     given_back = answer.headers["x-request-id"]
-    assert given_back != sent
+    assert given_back not in sent
     assert len(given_back) == 16
     assert answer.json()["request_id"] == given_back
-
-
-def test_two_ids_are_none(client):
-    headers = [("X-Request-ID", "a"), ("X-Request-ID", "b")]
-    assert client.get("/healthz", headers=headers).headers["x-request-id"] not in ("a", "b")
 
 
 def test_a_fault_has_its_request_id_everywhere(client, caplog):
@@ -173,14 +171,6 @@ def scrape():
     return lambda metrics: values_of(generate_latest(metrics.registry).decode())
 
 
-def test_prometheus_scrapes_a_port_of_their_own():
-    metrics = Metrics()
-    metrics.gauge("pns_made", "…", lambda: 3)
-    port = metrics.serve("127.0.0.1", 0)
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
-        assert labelled(values_of(answer.read().decode()), "pns_made") == 3
-
-
 def test_requests_are_counted_by_route_status_and_code(client, scrape):
     client.post("/subdivide", content=b"echo", headers=GLB)
     client.post("/subdivide", content=b"unreadable", headers=GLB)
@@ -224,7 +214,7 @@ def test_a_stranger_cannot_make_series(client, scrape):
     assert not any((method or "").startswith("M") for method in methods)
 
 
-def test_jobs_faces_models_and_restarts_are_counted(scrape):
+def test_jobs_faces_models_and_restarts_are_served_on_a_port_of_their_own():
     metrics = Metrics()
     done = SimpleNamespace(faces_in=4, faces=64)
     seconds = {"queue": 0.2, "read": 0.1, "refine": 0.3}
@@ -233,7 +223,9 @@ def test_jobs_faces_models_and_restarts_are_counted(scrape):
     metrics.catalogue(Catalogue(("general",), json.dumps([entry]).encode()))
     metrics.gauge("pns_queue_jobs", "Jobs that wait", lambda: 3)
     metrics.restart("worker-died")
-    values = scrape(metrics)
+    port = metrics.serve("127.0.0.1", 0)
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+        values = values_of(answer.read().decode())
     assert labelled(values, "pns_faces_total", direction="in") == 4
     assert labelled(values, "pns_faces_total", direction="out") == 64
     assert labelled(values, "pns_queue_seconds_sum") == pytest.approx(0.2)

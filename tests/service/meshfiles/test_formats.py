@@ -1,4 +1,4 @@
-"""OBJ, PLY, STL and OFF: what goes in comes out, refined, with nothing cracked or invented."""
+"""OBJ, PLY, STL, OFF and 3MF: what goes in comes out, refined, with nothing cracked or invented."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_written_and_read_again_is_the_same_surface(kind: str) -> None:
         again.vertices[again.faces], mesh_file.vertices[mesh_file.faces], rtol=1e-6, atol=1e-7
     )
     assert again.changes == ()
-    if kind == "stl":
+    if kind in formats.OF_TRIANGLES:
         assert again.layers == {}
     else:
         np.testing.assert_allclose(uv_of(again), uv_of(mesh_file), atol=1e-6)
@@ -77,7 +77,7 @@ def test_an_stl_of_many_solids_is_the_same_surface_as_one_of_few() -> None:
     assert np.array_equal(read.vertices[read.faces[: len(facets)]], whole.vertices[whole.faces])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", sorted({*KINDS} - {"3mf"}))
 def test_trimesh_reads_what_is_written(kind: str) -> None:
     mesh = trimesh.load_mesh(io.BytesIO(formats.write(part(), kind)), file_type=kind)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
@@ -330,10 +330,11 @@ def test_assets_refine_without_cracks(name: str, faces: int) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_too_large_to_be_read_is_refused_before_it_is_read(kind: str) -> None:
-    # It is no mesh at all: whoever read it would say so.
-    most = formats.memory_to_read(b"0" * 1000, kind) - 1
+    # It is no mesh at all, but for the archive: whoever read it would say so.
+    data = formats.write(part(), kind) if kind == "3mf" else b"0" * 1000
+    most = formats.memory_to_read(data, kind) - 1
     with pytest.raises(LimitError) as refusal:
-        formats.read_within(b"0" * 1000, kind, Limits(max_memory_bytes=most))
+        formats.read_within(data, kind, Limits(max_memory_bytes=most))
     assert refusal.value.limit == "memory"
 
 

@@ -27,7 +27,7 @@ def mapped(source: Path, target: str, **options: Any) -> tuple[bytes, Path]:
     return output.read_bytes(), parents
 
 
-@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl"])
+@pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "3mf"])
 @pytest.mark.parametrize("material", [None, "m1"])
 @pytest.mark.parametrize("scheme", ["loop", "catmull-clark"])
 def test_a_map_of_one_matrix_makes_the_positions(

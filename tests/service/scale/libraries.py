@@ -14,7 +14,7 @@ from service.scale.job import run
 
 TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 LOOP = Options(scheme="loop", levels=1)
-KINDS = ("glb", "gltf", "obj", "ply", "stl", "off")
+KINDS = ("glb", "gltf", "obj", "ply", "stl", "off", "3mf")
 
 
 def here(tasks):

@@ -341,26 +341,6 @@ def test_what_cannot_be_used_is_told_before_anything_runs(tmp_path, changes):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "in"]
 
 
-def test_parquet_reports_hold_the_rows_that_json_lines_hold(tmp_path, monkeypatch):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="the extra [ray] is not installed")
-    # Written some at a time.
-    monkeypatch.setattr("service.scale.journal.BATCH", 2)
-    library(tmp_path / "in")
-    plain, columns = batch_of(tmp_path), batch_of(tmp_path, report=tmp_path / "report.parquet")
-    refined(plain)
-    for path in (tmp_path / "out").rglob("*.*"):
-        path.unlink()
-    refined(columns)
-    timed = ("seconds",)
-    table = parquet.read_table(columns.report).to_pylist()
-    assert len(table) == len(rows(plain)) > 2
-    for row in table:
-        expected = rows(plain)[Path(row["path"]).name]
-        assert {k: v for k, v in row.items() if not k.startswith(timed)} == {
-            k: v for k, v in expected.items() if not k.startswith(timed)
-        }
-
-
 def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
@@ -378,25 +358,6 @@ def test_the_command_says_what_failed_and_ends_with_one(tmp_path, monkeypatch):
     assert "a row for each file" not in planned.stderr
 
 
-def test_a_line_of_no_mesh_costs_itself_alone(tmp_path):
-    library(tmp_path, ["a.obj"])
-    (tmp_path / "list.txt").write_text("a.obj\nb.fbx\n")
-    batch = batch_of(tmp_path, tmp_path / "list.txt")
-    assert refined(batch).counts == {"done": 1, "failed": 1}
-    assert "fbx" in rows(batch)["b.fbx"]["detail"]
-
-
-def test_a_report_replaces_no_manifest(tmp_path):
-    library(tmp_path / "in", ["a.obj"])
-    manifest = tmp_path / "list.jsonl"
-    manifest.write_text('{"path": "in/a.obj", "note": "mine"}\n')
-    (tmp_path / "linked").symlink_to(tmp_path)
-    with pytest.raises(InvalidParameter, match=r"list\.jsonl: the report would replace SOURCE"):
-        refined(batch_of(tmp_path, manifest, report=tmp_path / "linked" / "list.jsonl"))
-    assert "mine" in manifest.read_text()
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_report_that_is_a_folder_is_told_before_the_work(tmp_path):
     (tmp_path / "r.jsonl").mkdir()
     with pytest.raises(InvalidParameter, match=r"r\.jsonl: it is a folder"):
@@ -404,16 +365,10 @@ def test_a_report_that_is_a_folder_is_told_before_the_work(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_parquet_report_without_what_writes_it_is_told_beforehand(tmp_path, monkeypatch):
-    monkeypatch.setattr("service.scale.journal.find_spec", lambda _: None)
-    with pytest.raises(InvalidParameter, match=r"Parquet needs the extra.*\.jsonl needs none"):
-        refined(batch_of(tmp_path, library(tmp_path / "in"), report=tmp_path / "r.parquet"))
-
-
 def test_a_worker_starts_without_what_only_a_driver_needs():
     code = (
         "import sys; from service.scale.job import read_libraries; read_libraries()\n"
-        "print({'onnxruntime', 'pyarrow', 'rich', 'typer'} & set(sys.modules))"
+        "print({'onnxruntime', 'rich', 'typer'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, check=True)
     assert done.stdout == b"set()\n"

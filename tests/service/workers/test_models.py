@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -12,8 +11,8 @@ import pytest
 from pns_common.model import file as model_file
 from pns_common.model.card import ModelCard
 from pns_common.model.file import DEFAULT_MODEL, load_model
-from service.errors import InvalidParameter, NoModelError
-from service.workers.models import ModelEntry, Models, catalogue_of
+from service.errors import NoModelError
+from service.workers.models import Models, catalogue_of
 from tests.support.packages import served_file, several_models
 from tests.support.stand_in_models import ZeroModel
 
@@ -46,28 +45,6 @@ def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(tmp_pa
     assert serving(ZeroModel()).get("zero") == ZeroModel()
 
 
-@pytest.mark.parametrize("name", ["mine.onnx", "./paper", "models/paper.onnx", "paper.onnx", "x"])
-def test_a_path_is_no_name_even_of_the_served_file(tmp_path: Path, name: str) -> None:
-    served_file(tmp_path / "x.onnx")
-    models = serving(served_file(tmp_path / "mine.onnx"))
-    with pytest.raises(InvalidParameter) as refusal:
-        models.get(name)
-    assert refusal.value.name == "model"
-    assert refusal.value.choices == tuple(sorted([*NAMES, "mine"]))
-    with pytest.raises(InvalidParameter):
-        models.get(str(tmp_path / "mine.onnx"))
-
-
-def test_a_file_that_does_not_load_keeps_no_other_from_its_work() -> None:
-    models = serving(None)
-    with pytest.raises(NoModelError, match="ONNX"):
-        models.get("broken")
-    assert models.get("vertices").card.features == "directed-28"
-    with pytest.raises(NoModelError, match="missing"):
-        serving("missing.onnx").get()
-    assert serving("missing.onnx").get("paper").name == "paper"
-
-
 def test_a_bundled_name_wins_over_that_of_the_served_file(tmp_path: Path) -> None:
     models = serving(served_file(tmp_path / "paper.onnx"))
     assert models.get("paper").hash == load_model("paper").hash != models.get().hash
@@ -87,11 +64,6 @@ def test_the_catalogue_says_what_the_files_say() -> None:
         assert (entry["hash"], entry["size"]) == (model.hash, model.size)
         card = {name: entry[name] for name in ModelCard.__dataclass_fields__}
         assert ModelCard(**card) == model.card
-
-
-def test_an_entry_has_every_field_of_a_card() -> None:
-    own = {"name", "default", "hash", "size", "providers"}
-    assert set(ModelEntry.model_fields) == own | set(ModelCard.__dataclass_fields__)
 
 
 def test_a_served_file_is_the_default_and_one_that_does_not_load_is_not_listed(
@@ -130,10 +102,3 @@ def test_a_model_without_a_file_has_no_size() -> None:
     entry = entries(serving(ZeroModel()))["zero", True]
     assert entry["size"] is None
     assert asdict(ZeroModel().card).items() <= entry.items()
-
-
-def test_same_models_same_bytes_same_tag() -> None:
-    first, again = catalogue_of(serving(None)), catalogue_of(serving(None))
-    assert (first, first.tag) == (again, again.tag)
-    assert first.tag != catalogue_of(serving("vertices")).tag
-    assert first.tag.strip('"') == hashlib.sha256(first.content).hexdigest()[:32]

@@ -13,18 +13,19 @@ from contextlib import asynccontextmanager
 from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import pytest
 from pebble.common import CONSTS
 from pebble.pool import process as pebble_process
 
-from service.errors import BusyError, GltfError, JobTimeout, WorkerDied
+from service.errors import GltfError, JobTimeout, WorkerDied
 from service.workers import pool as pools
 from service.workers.pool import Workers
 from service.workers.worker import JobFaultError
 from tests.support import stand_in_jobs as jobs
 
+pytestmark = pytest.mark.anyio
 T = TypeVar("T")
 PAGE = resource.getpagesize()
 
@@ -46,13 +47,10 @@ async def workers(
     pool = Counted(count, seconds, warm_up)
     pool.start()
     try:
-        yield pool
+        async with asyncio.timeout(60):
+            yield pool
     finally:
         await pool.stop()
-
-
-def run(scenario: Callable[[], Awaitable[None]]) -> None:
-    asyncio.run(asyncio.wait_for(scenario(), 60))
 
 
 def alive(process: int) -> bool:
@@ -63,8 +61,10 @@ def alive(process: int) -> bool:
     return True
 
 
-def do(pool: Workers, function: Callable[..., T], *arguments: object, **more: Any) -> Awaitable[T]:
-    return pool.run(pool.join(more.pop("client", "a")), function, *arguments, **more)
+def do(
+    pool: Workers, function: Callable[..., T], *arguments: object, client: str = "a"
+) -> Awaitable[T]:
+    return pool.run(pool.join(client), function, *arguments)
 
 
 async def until(holds: Callable[[], bool]) -> None:
@@ -72,221 +72,157 @@ async def until(holds: Callable[[], bool]) -> None:
         await asyncio.sleep(0.005)
 
 
-def test_errors_cross_the_process_boundary_and_the_worker_lives_on() -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            first = await do(pool, jobs.pid)
-            with pytest.raises(GltfError) as caught:
-                await do(pool, jobs.refuse)
-            assert caught.value.pointer == "/meshes/0"
-            with pytest.raises(JobFaultError, match="UnpicklableError"):
-                await do(pool, jobs.fault)
-            assert await do(pool, jobs.pid) == first
-            assert first != os.getpid()
-
-    run(scenario)
+async def test_errors_cross_the_process_boundary_and_the_worker_lives_on() -> None:
+    async with workers() as pool:
+        first = await do(pool, jobs.pid)
+        with pytest.raises(GltfError) as caught:
+            await do(pool, jobs.refuse)
+        assert caught.value.pointer == "/meshes/0"
+        with pytest.raises(JobFaultError, match="UnpicklableError"):
+            await do(pool, jobs.fault)
+        assert await do(pool, jobs.pid) == first
+        assert first != os.getpid()
 
 
-def test_a_job_past_its_deadline_is_killed_even_while_it_holds_the_interpreter() -> None:
-    async def scenario() -> None:
-        async with workers(seconds=3) as pool:
-            first = await do(pool, jobs.pid)
-            with pytest.raises(JobTimeout):
-                await do(pool, jobs.hold)
-            assert await do(pool, jobs.pid) != first
-            assert not alive(first)
-
-    run(scenario)
+async def test_a_job_past_its_deadline_is_killed_even_while_it_holds_the_interpreter() -> None:
+    async with workers(seconds=3) as pool:
+        first = await do(pool, jobs.pid)
+        with pytest.raises(JobTimeout):
+            await do(pool, jobs.hold)
+        # Its files are closed now, and another job may get their numbers.
+        assert not alive(first)
+        assert await do(pool, jobs.pid) != first
 
 
-def test_a_dying_worker_takes_only_its_own_job(tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with workers(count=2) as pool:
-            neighbour = asyncio.create_task(do(pool, jobs.wait_between, tmp_path, client="b"))
-            await until((tmp_path / "begun").exists)
-            with pytest.raises(WorkerDied):
-                await do(pool, jobs.die)
-            (tmp_path / "go").touch()
-            assert alive(await neighbour)
-            assert await asyncio.gather(*(do(pool, jobs.sleep, 0.0) for _ in range(4)))
-
-    run(scenario)
+async def test_a_dying_worker_takes_only_its_own_job(tmp_path: Path) -> None:
+    async with workers(count=2) as pool:
+        neighbour = asyncio.create_task(do(pool, jobs.wait_between, tmp_path, client="b"))
+        await until((tmp_path / "begun").exists)
+        with pytest.raises(WorkerDied):
+            await do(pool, jobs.die)
+        (tmp_path / "go").touch()
+        assert alive(await neighbour)
+        assert await asyncio.gather(*(do(pool, jobs.sleep, 0.0) for _ in range(4)))
 
 
-def test_a_worker_that_dies_idle_is_replaced() -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            first = await do(pool, jobs.pid)
-            os.kill(first, signal.SIGKILL)
-            await until(lambda: pool.restarts["idle"] == 1)
-            assert await do(pool, jobs.pid) != first
-
-    run(scenario)
+async def test_a_worker_that_dies_idle_is_replaced() -> None:
+    async with workers() as pool:
+        first = await do(pool, jobs.pid)
+        os.kill(first, signal.SIGKILL)
+        await until(lambda: pool.restarts["idle"] == 1)
+        assert await do(pool, jobs.pid) != first
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
 @pytest.mark.parametrize("job", [jobs.leave_freed, jobs.leave_small_ones])
-def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
+async def test_a_worker_that_rests_gives_back_what_its_job_has_freed(
     job: Callable[[], int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Kept for the next job, it would be counted against those of other workers."""
     monkeypatch.setattr(pools, "WATCH_SECONDS", 0.05)
 
-    async def scenario() -> None:
-        async with workers() as pool:
-            process = await do(pool, jobs.pid)
-            kept = await do(pool, job)
-            await until(lambda: jobs.pages(process) < kept - 20 * 2**20 // PAGE)
-            assert await do(pool, jobs.pid) == process
-
-    run(scenario)
+    async with workers() as pool:
+        process = await do(pool, jobs.pid)
+        kept = await do(pool, job)
+        await until(lambda: jobs.pages(process) < kept - 20 * 2**20 // PAGE)
+        assert await do(pool, jobs.pid) == process
 
 
-def test_cancelling_a_job_that_waits_kills_nothing(tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            running = asyncio.create_task(do(pool, jobs.wait_between, tmp_path))
-            await until((tmp_path / "begun").exists)
-            waiting = asyncio.create_task(do(pool, jobs.pid))
-            await asyncio.sleep(0)
-            waiting.cancel()
-            (tmp_path / "go").touch()
-            assert await running == await do(pool, jobs.pid)
-
-    run(scenario)
+async def test_cancelling_a_job_that_waits_kills_nothing(tmp_path: Path) -> None:
+    async with workers() as pool:
+        running = asyncio.create_task(do(pool, jobs.wait_between, tmp_path))
+        await until((tmp_path / "begun").exists)
+        waiting = asyncio.create_task(do(pool, jobs.pid))
+        await asyncio.sleep(0)
+        waiting.cancel()
+        (tmp_path / "go").touch()
+        assert await running == await do(pool, jobs.pid)
 
 
-def test_a_warm_up_may_take_longer_than_a_job() -> None:
-    async def scenario() -> None:
-        async with workers(seconds=0.3, warm_up=partial(jobs.sleep, 1.0)) as pool:
-            while not pool.ready:
-                await asyncio.sleep(0.1)
-            with pytest.raises(JobTimeout):
-                await do(pool, jobs.sleep, 5.0)
-
-    run(scenario)
+async def test_a_warm_up_may_take_longer_than_a_job() -> None:
+    async with workers(seconds=0.3, warm_up=partial(jobs.sleep, 1.0)) as pool:
+        while not pool.ready:
+            await asyncio.sleep(0.1)
+        with pytest.raises(JobTimeout):
+            await do(pool, jobs.sleep, 5.0)
 
 
-def test_a_frozen_worker_hangs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_frozen_worker_hangs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CONSTS, "term_timeout", 0.1)
 
-    async def scenario() -> None:
-        async with workers(seconds=3) as pool:
-            first = await do(pool, jobs.pid)
-            os.kill(first, signal.SIGSTOP)
-            # It does not even say that it has begun.
-            with pytest.raises(JobTimeout):
-                await do(pool, jobs.pid)
-            assert await do(pool, jobs.pid) != first
-            assert pool.restarts == {"job-timeout": 1}
-
-    run(scenario)
+    async with workers(seconds=3) as pool:
+        first = await do(pool, jobs.pid)
+        os.kill(first, signal.SIGSTOP)
+        # It does not even say that it has begun.
+        with pytest.raises(JobTimeout):
+            await do(pool, jobs.pid)
+        assert await do(pool, jobs.pid) != first
+        assert pool.restarts == {"job-timeout": 1}
 
 
-def test_a_job_that_looks_ends_itself_and_its_worker_lives_on(tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            first = await do(pool, jobs.pid)
-            job = asyncio.create_task(
-                do(pool, jobs.wait_between, tmp_path, stop=(tmp_path / "go").touch)
-            )
-            await until((tmp_path / "begun").exists)
-            job.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await job
-            assert await do(pool, jobs.pid) == first
-            assert pool.restarts == {}
-
-    run(scenario)
+async def test_a_job_that_looks_ends_itself_and_its_worker_lives_on(tmp_path: Path) -> None:
+    async with workers() as pool:
+        first = await do(pool, jobs.pid)
+        job = asyncio.create_task(do(pool, jobs.take_steps, tmp_path))
+        await until((tmp_path / "took-1").exists)
+        job.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await job
+        assert await do(pool, jobs.pid) == first
+        assert pool.restarts == {}
 
 
-def test_a_job_that_does_not_look_is_killed(tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            first = await do(pool, jobs.pid)
-            job = asyncio.create_task(
-                do(pool, jobs.begin_to_hold, tmp_path / "begun", stop=jobs.nothing)
-            )
-            await until((tmp_path / "begun").exists)
-            job.cancel()
-            assert await do(pool, jobs.pid) != first
-            assert pool.restarts == {"stopped": 1}
-
-    run(scenario)
+async def test_a_job_that_does_not_look_is_killed(tmp_path: Path) -> None:
+    async with workers() as pool:
+        first = await do(pool, jobs.pid)
+        job = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
+        await until((tmp_path / "begun").exists)
+        job.cancel()
+        await asyncio.gather(job, return_exceptions=True)
+        assert not alive(first)
+        assert await do(pool, jobs.pid) != first
+        assert pool.restarts == {"stopped": 1}
 
 
-def test_stop_ends_running_jobs(tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            process = await do(pool, jobs.pid)
-            task = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
-            await until((tmp_path / "begun").exists)
-        assert not alive(process)
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    run(scenario)
+async def test_stop_ends_running_jobs(tmp_path: Path) -> None:
+    async with workers() as pool:
+        process = await do(pool, jobs.pid)
+        task = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
+        await until((tmp_path / "begun").exists)
+    assert not alive(process)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
 
 
-def test_ready_once_a_worker_has_warmed_up() -> None:
-    async def scenario() -> None:
-        async with workers() as pool:
-            assert not pool.ready
-            await do(pool, jobs.nothing)
-            assert pool.ready
-        async with workers(warm_up=jobs.refuse) as pool:
-            await do(pool, jobs.nothing)
-            assert not pool.ready
-
-    run(scenario)
-
-
-def test_not_ready_once_the_last_warm_worker_is_gone(tmp_path: Path) -> None:
+async def test_ready_while_a_worker_that_has_warmed_up_lives(tmp_path: Path) -> None:
     model = tmp_path / "model"
     model.touch()
-
-    async def scenario() -> None:
-        async with workers(warm_up=partial(jobs.needs, str(model))) as pool:
-            first = await do(pool, jobs.pid)
-            assert pool.ready
-            model.unlink()
-            os.kill(first, signal.SIGKILL)
-            while pool.ready:
-                await asyncio.sleep(0.05)
-            # The next one lives, but has no model.
-            assert await do(pool, jobs.pid) != first
-            assert not pool.ready
-
-    run(scenario)
+    async with workers(warm_up=partial(jobs.needs, str(model))) as pool:
+        assert not pool.ready
+        first = await do(pool, jobs.pid)
+        assert pool.ready
+        model.unlink()
+        os.kill(first, signal.SIGKILL)
+        await until(lambda: not pool.ready)
+        # The next one lives, but has no model.
+        assert await do(pool, jobs.pid) != first
+        assert not pool.ready
 
 
-def test_a_worker_whose_warm_up_kills_it_is_tried_again_without_haste() -> None:
-    async def scenario() -> None:
-        async with workers(warm_up=jobs.die, seconds=2) as pool:
-            with pytest.raises(BusyError):
-                await do(pool, jobs.nothing)
-            assert not pool.ready
-
-    run(scenario)
-
-
-def test_a_worker_whose_warm_up_fails_is_tried_again(tmp_path: Path) -> None:
+async def test_a_worker_whose_warm_up_fails_is_tried_again(tmp_path: Path) -> None:
     """A full disk, say, or no memory for a moment: nobody else would start the service anew."""
     kernels = tmp_path / "kernels"
 
-    async def scenario() -> None:
-        async with workers(warm_up=partial(os.stat, kernels)) as pool:
-            while not pool.restarts["start"]:
-                await asyncio.sleep(0.05)
-            kernels.touch()
-            while not pool.ready:
-                await asyncio.sleep(0.05)
-
-    run(scenario)
+    async with workers(warm_up=partial(os.stat, kernels)) as pool:
+        while not pool.restarts["start"]:
+            await asyncio.sleep(0.05)
+        kernels.touch()
+        while not pool.ready:
+            await asyncio.sleep(0.05)
 
 
 @pytest.mark.parametrize("what", ["channels", "launch_process"])
-def test_a_process_that_the_system_refuses_is_told_and_tried_again(
+async def test_a_process_that_the_system_refuses_is_told_and_tried_again(
     what: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """No descriptor, no semaphore or no process is left: for a while."""
@@ -300,16 +236,13 @@ def test_a_process_that_the_system_refuses_is_told_and_tried_again(
 
     monkeypatch.setattr(pebble_process, what, refuses_once)
 
-    async def scenario() -> None:
-        async with workers() as pool:
-            assert await do(pool, jobs.sleep, 0.0) == "slept"
-
-    run(scenario)
+    async with workers() as pool:
+        assert await do(pool, jobs.sleep, 0.0) == "slept"
     told = "a worker did not start: [Errno 11] Resource temporarily unavailable"
     assert told in caplog.messages
 
 
-def test_ctrl_c_is_the_server_s_alone() -> None:
+async def test_ctrl_c_is_the_server_s_alone() -> None:
     """A terminal sends it to all; a worker that is still importing would draw its traceback.
 
     So it is with SIGHUP, where the terminal closes.
@@ -318,54 +251,45 @@ def test_ctrl_c_is_the_server_s_alone() -> None:
     # Python starts its own with the first of all workers, which lets through what is blocked.
     resource_tracker._resource_tracker._stop()  # pyright: ignore[reportAttributeAccessIssue]
 
-    async def scenario() -> None:
-        async with workers() as pool:
-            blocked = await do(pool, signal.pthread_sigmask, signal.SIG_BLOCK, ())
-            assert {signal.SIGINT, signal.SIGHUP} <= blocked
-            assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
-
-    run(scenario)
+    async with workers() as pool:
+        blocked = await do(pool, signal.pthread_sigmask, signal.SIG_BLOCK, ())
+        assert {signal.SIGINT, signal.SIGHUP} <= blocked
+        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-def test_one_client_leaves_a_worker_to_others_and_who_came_first_is_next(tmp_path: Path) -> None:
+async def test_one_client_leaves_a_worker_to_others_and_who_came_first_is_next(
+    tmp_path: Path,
+) -> None:
     """Six jobs without an end would else stop all work."""
-
-    async def scenario() -> None:
-        async with workers(count=2) as pool:
-            await until(lambda: len(pool._free) == 2)
-            endless, turns = [], []
-            for number in range(6):
-                turns.append(pool.join("greedy"))
-                job = pool.run(turns[-1], jobs.begin_to_hold, tmp_path / str(number))
-                endless.append(asyncio.create_task(job))
-            await until((tmp_path / "0").exists)
-            assert [pool.place(turn) for turn in turns] == [0, 0, 1, 2, 3, 4]
-            for _ in range(3):
-                assert await do(pool, jobs.sleep, 0.0, client="honest") == "slept"
-            assert [path.name for path in tmp_path.iterdir()] == ["0"]
-            for job in endless:
-                job.cancel()
-            await asyncio.gather(*endless, return_exceptions=True)
-
-    run(scenario)
-
-
-def test_who_leaves_holds_its_worker_until_there_is_another(tmp_path: Path) -> None:
-    """Else one client that comes and goes would end all workers at once."""
-
-    async def scenario() -> None:
-        async with workers(count=2) as pool:
-            await until(lambda: len(pool._free) == 2)
-            job = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
-            await until((tmp_path / "begun").exists)
+    async with workers(count=2) as pool:
+        await until(lambda: [each.holder for each in pool._processes] == [None] * 2)
+        endless, turns = [], []
+        for number in range(6):
+            turns.append(pool.join("greedy"))
+            job = pool.run(turns[-1], jobs.begin_to_hold, tmp_path / str(number))
+            endless.append(asyncio.create_task(job))
+        await until((tmp_path / "0").exists)
+        assert [pool.place(turn) for turn in turns] == [0, 0, 1, 2, 3, 4]
+        for _ in range(3):
+            assert await do(pool, jobs.sleep, 0.0, client="honest") == "slept"
+        assert [path.name for path in tmp_path.iterdir()] == ["0"]
+        for job in endless:
             job.cancel()
-            await asyncio.gather(job, return_exceptions=True)
-            again = pool.join("a")
-            assert not again.pool.done()
-            assert await do(pool, jobs.sleep, 0.0, client="b") == "slept"
-            assert not again.pool.done()
-            assert await pool.run(again, jobs.sleep, 0.0) == "slept"
-            assert pool.restarts == {"stopped": 1}
-            assert pool.held == {}
+        await asyncio.gather(*endless, return_exceptions=True)
 
-    run(scenario)
+
+async def test_who_leaves_holds_its_worker_until_there_is_another(tmp_path: Path) -> None:
+    """Else one client that comes and goes would end all workers at once."""
+    async with workers(count=2) as pool:
+        await until(lambda: [each.holder for each in pool._processes] == [None] * 2)
+        job = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
+        await until((tmp_path / "begun").exists)
+        job.cancel()
+        await asyncio.gather(job, return_exceptions=True)
+        again = pool.join("a")
+        assert not again.process.done()
+        assert await do(pool, jobs.sleep, 0.0, client="b") == "slept"
+        assert not again.process.done()
+        assert await pool.run(again, jobs.sleep, 0.0) == "slept"
+        assert pool.restarts == {"stopped": 1}
+        assert pool.held == {}

@@ -1,6 +1,6 @@
 /** Which files the page takes, and what the service calls them. */
 
-export type Kind = "glb" | "gltf" | "zip" | "obj" | "ply" | "stl" | "off";
+export type Kind = "glb" | "gltf" | "zip" | "obj" | "ply" | "stl" | "off" | "3mf";
 
 export const MEDIA_TYPES: Record<Kind, string> = {
   glb: "model/gltf-binary",
@@ -10,6 +10,7 @@ export const MEDIA_TYPES: Record<Kind, string> = {
   ply: "model/ply",
   stl: "model/stl",
   off: "model/off",
+  "3mf": "model/3mf",
 };
 
 /** Other endings of a kind. */

@@ -1,4 +1,4 @@
-/** OBJ, PLY, STL and OFF as geometry: positions, an OBJ's materials, and the colours of a PLY's vertices. */
+/** OBJ, PLY, STL, OFF and 3MF as geometry: positions, an OBJ's materials, and the colours of a PLY or a 3MF. */
 
 import { BufferGeometry } from "three";
 import { STLLoader } from "three/addons/loaders/STLLoader.js";
@@ -6,6 +6,7 @@ import { readObj } from "./obj";
 import { readOff } from "./off";
 import { readPly } from "./ply";
 import { textOf } from "./text";
+import { read3mf } from "./threemf";
 
 export function readMesh(bytes: ArrayBuffer, kind: string): BufferGeometry {
   const geometry = READERS[kind]?.(bytes);
@@ -18,4 +19,5 @@ const READERS: Record<string, (bytes: ArrayBuffer) => BufferGeometry> = {
   ply: readPly,
   stl: (bytes) => new BufferGeometry().setAttribute("position", new STLLoader().parse(bytes).getAttribute("position")),
   off: readOff,
+  "3mf": read3mf,
 };

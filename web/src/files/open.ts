@@ -46,6 +46,12 @@ export async function open(upload: Upload): Promise<Opened> {
   }
   const mesh = new Mesh(geometry);
   plain([mesh]);
+  // As the service's GLB has it: z upwards becomes y, and lengths are metres.
+  const { metres } = geometry.userData as { metres?: number };
+  if (metres) {
+    mesh.rotation.x = -Math.PI / 2;
+    mesh.scale.setScalar(metres);
+  }
   const missing = new Set<string>();
   const { libraries = [] } = geometry.userData as Partial<ObjMaterials>;
   if (libraries.length) {

@@ -34,7 +34,7 @@ export interface Dropped {
 }
 
 // What is opened first: a document before an archive, and before a mesh without materials.
-const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off"];
+const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off", "3mf"];
 // Files that operating systems leave beside others.
 const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$|desktop\.ini$)/i;
 

@@ -13,6 +13,7 @@ const MEDIA_TYPES: Record<Format, string> = {
   ply: "model/ply",
   stl: "model/stl",
   off: "model/off",
+  "3mf": "model/3mf",
 };
 
 const FORMATS = Object.keys(MEDIA_TYPES) as Format[];
