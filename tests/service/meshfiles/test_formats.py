@@ -279,6 +279,25 @@ def test_white_of_fractions_is_no_one_of_255_in_an_off() -> None:
     assert all(b"." in word for line in lines[2:5] for word in line.split()[3:])
 
 
+def test_colours_of_two_bytes_are_fractions_in_an_off() -> None:
+    rows = TRIANGLE.replace(b"\n", b" 65535 0 32768\n")
+    head = b"ply\nformat ascii 1.0\nelement vertex 3\n" + b"".join(
+        b"property %s\n" % name
+        for name in (
+            b"float x",
+            b"float y",
+            b"float z",
+            b"ushort red",
+            b"ushort green",
+            b"ushort blue",
+        )
+    )
+    head += b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    made = formats.write(formats.read(head + rows + b"3 0 1 2\n", "ply"), "off")
+    colours = [[*map(float, line.split()[3:])] for line in made.splitlines()[2:5]]
+    np.testing.assert_allclose(colours, [[1, 0, 32768 / 65535]] * 3)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "data", [b"", b"garbage", b"\0" * 200, b"ply\nformat ascii 1.0\n", b"OFF\n3 1 0\n0 0 0\n"]
