@@ -6,23 +6,12 @@ trimesh and meshio stop at polygons, at headers that are not alone on their line
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..errors import UnreadableError
-from .mesh_file import (
-    COLOUR,
-    NORMAL,
-    UV,
-    Layer,
-    MeshFile,
-    as_fractions,
-    colours_of,
-    dropped,
-    offsets_of,
-)
+from .mesh_file import COLOUR, NORMAL, UV, Layer, MeshFile, colours_of, dropped, offsets_of
 from .text import NUMBER, Text, cut_text, plain_text, rows_text
 
 # The counts may be glued to it: hundreds of files of ModelNet40 begin with "OFF216 183 0". Or they
@@ -279,8 +268,6 @@ def _whole(
 def write_off(mesh: MeshFile) -> bytes:
     """Write the file's bytes; every layer belongs to vertices."""
     kept = {name: mesh.layers[name] for name in (NORMAL, COLOUR, UV) if name in mesh.layers}
-    if COLOUR in kept:
-        kept[COLOUR] = replace(kept[COLOUR], values=_without_words(kept[COLOUR].values))
     prefix = f"{'ST' * (UV in kept)}{'C' * (COLOUR in kept)}{'N' * (NORMAL in kept)}"
     columns, form = [mesh.vertices], f"{NUMBER} {NUMBER} {NUMBER}"
     for name, layer in kept.items():
@@ -291,7 +278,6 @@ def write_off(mesh: MeshFile) -> bytes:
     pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n".encode()]
     pieces += rows_text(f"{form}\n", np.hstack(columns))
     colours = mesh.face_values.get(COLOUR)
-    colours = None if colours is None else _without_words(colours)
     behind = "" if colours is None else _form(colours) * colours.shape[1]
     sizes = mesh.sizes
     for size in np.unique(sizes).tolist():
@@ -301,11 +287,6 @@ def write_off(mesh: MeshFile) -> bytes:
         rows += [] if colours is None else [colours[chosen]]
         pieces += rows_text(f"%d{' %d' * size}{behind}\n", np.hstack(rows))
     return b"".join(pieces)
-
-
-def _without_words(colours: np.ndarray) -> np.ndarray:
-    """Return components of two bytes as fractions: whole numbers are bytes in an OFF."""
-    return as_fractions(colours) if colours.dtype.itemsize == 2 else colours
 
 
 def _form(colours: np.ndarray) -> str:
