@@ -28,7 +28,7 @@ COMPILED := pns_common/kernels/compiled.abi3.so
 PROCESSES ?= 2
 PYTEST := OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest -n $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: prose size bench bench-answers hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web release pictures
+.PHONY: prose size bench hashes soak manifest serve test checks lint kernels shapes unit quick exhaustive verify-models docs fuzz models constraints clean blender addon blender-test blender-measure blender-pictures interop-test paper-hero web release pictures
 
 serve: $(SERVE)/.ready
 	@$(SERVE)/bin/pns serve $(if $(HOST),--host $(HOST)) $(if $(PORT),--port $(PORT))
@@ -238,21 +238,11 @@ constraints:
 	mv constraints.txt.new constraints.txt
 	rm -rf .venv-constraints
 
-# Refinement beside other libraries' Loop: numbers into benchmarks/results.json, and the plot. The C++
-# peers are built where Debian's packages can be had; a peer that cannot be set up is left out by name.
+# Refinement beside other libraries' Loop: numbers into benchmarks/results.json. The C++ peers are built
+# where Debian's packages can be had; a peer that cannot be set up is left out by name.
 # Ours runs in the environment of `make serve`, as users have it; BENCH holds further options.
 bench: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/.ready
 	$(DEV)/bin/python -m benchmarks --python $(SERVE)/bin/python $(BENCH)
-
-# Files answered a second on one core, beside other programs: half a minute for each of six rows.
-bench-answers: $(DEV)/.ready $(SERVE)/.ready $(PEERS)/.ready build/bench/node/.ready
-	$(DEV)/bin/python -m benchmarks.answers --python $(SERVE)/bin/python $(BENCH)
-
-build/bench/node/.ready: benchmarks/peers/package.json
-	mkdir -p $(@D)
-	cp $< $(@D)
-	cd $(@D) && npm install --ignore-scripts --no-audit --no-fund
-	touch $@
 
 # One by one: a library without a build for this machine keeps no other away.
 $(PEERS)/.ready: benchmarks/peers/requirements.txt

@@ -1,6 +1,6 @@
 """`python -m benchmarks`: our refinement beside other libraries' Loop and Catmull–Clark.
 
-python -m benchmarks                   # all cases; results.json and the plot beside this file
+python -m benchmarks                   # all cases; results.json beside this file
 python -m benchmarks --largest 80000   # small meshes only, nothing written
 make bench                             # sets the peers up first
 """
@@ -20,13 +20,11 @@ from benchmarks.contest import OURS, Case, contest, ours
 from benchmarks.generated import ORDERS
 from benchmarks.memory import MIB
 from benchmarks.peers.available import available_peers
-from benchmarks.plot import plot_results
 from benchmarks.startup import startup, startup_table
 from pns_common.files import replace_file
 from pns_common.model.file import DEFAULT_MODEL, bundled_models
 
-HERE = Path(__file__).parent
-RESULTS, PICTURE = HERE / "results.json", HERE / "speed.png"
+RESULTS = Path(__file__).with_name("results.json")
 CASES = (
     *(Case("closed", faces) for faces in (5_000, 20_000, 80_000)),
     *(Case(order, 320_000) for order in ORDERS),
@@ -46,7 +44,7 @@ def main(
     in_a_row: Annotated[int, typer.Option(help="runs of a turn, one right after the other")] = 1,
     largest: Annotated[int, typer.Option(help="leave out meshes above this")] = CASES[-1].faces,
     model: Annotated[list[str] | None, typer.Option(help="bundled models to measure")] = None,
-    write: Annotated[bool, typer.Option(help="write results.json and the plot")] = True,
+    write: Annotated[bool, typer.Option(help="write results.json")] = True,
     python: Annotated[str, typer.Option(help="of the environment that ours runs in")] = THIS,
 ) -> None:
     """Measure every case, with the first call apart from the warm ones."""
@@ -83,7 +81,6 @@ def main(
                 "cases": done,
             }
             replace_file(RESULTS, (json.dumps(result, indent=1) + "\n").encode())
-            plot_results(result, PICTURE)
     console.print(growth_table(done))
 
 

@@ -72,7 +72,7 @@ class Truth:
             mesh.face_count,
             self.error(mesh),
             borders(mesh) - borders(self.coarse),
-            crossing_faces(mesh) / mesh.face_count,
+            float(crossing_faces(mesh).mean()),
         )
 
     def largest(self, low: float, high: float, make: Callable[[float], Mesh]) -> Mesh:

@@ -1,6 +1,6 @@
-"""`python -m benchmarks.stages`: seconds and peak memory by stage, beside trimesh's Loop.
+"""`python -m benchmarks.stages`: seconds and peak memory of glTF files by stage.
 
-python -m benchmarks.stages                         # generated meshes, 20k to 1.3M faces
+python -m benchmarks.stages                         # generated meshes, 20k to 320k faces
 python -m benchmarks.stages --assets FOLDER         # also every glTF file in a folder
 python -m benchmarks.stages --model paper           # another model than the default
 """
@@ -15,10 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.files import SHADINGS, STAGES, MeasuredFile, measure_file, measure_generated
-from benchmarks.operator import METHODS, measure_operator
 from pns_common.model.file import DEFAULT_MODEL
 
-SIZES = (20_000, 80_000, 320_000, 1_300_000)
 # In a file or a pipe tables are not squeezed.
 FILE_WIDTH = 150
 # A file's output is held as bytes too: these are input faces.
@@ -28,18 +26,16 @@ FILE_SIZES = (20_000, 60_000, 320_000)
 def main(
     assets: Annotated[Path | None, typer.Option(help="folder of .glb and .gltf files")] = None,
     levels: Annotated[int, typer.Option(help="levels for files")] = 1,
-    runs: Annotated[int, typer.Option(help="runs of each operator measurement; the median")] = 5,
-    largest: Annotated[int, typer.Option(help="leave out generated meshes above this")] = SIZES[-1],
+    largest: Annotated[int, typer.Option(help="leave out generated meshes above this")] = 320_000,
     model: Annotated[
         str, typer.Option(metavar="NAME|FILE", help="bundled model, or model file")
     ] = DEFAULT_MODEL,
 ) -> None:
-    """Measure the operator and the whole path of a file, each case in a process of its own."""
+    """Measure the whole path of a file, each case in a process of its own."""
     console = Console()
     if not console.is_terminal:
         console = Console(width=FILE_WIDTH)
     console.print(f"model: {model}")
-    console.print(operator_table([size for size in SIZES if size <= largest], runs, model))
     named = {
         f"torus, {size:,} faces{shading and ', '}{shading}": measure_generated(
             size, levels, model, shading=shading
@@ -54,22 +50,6 @@ def main(
     for name, file in named.items():
         if file.refused is not None:
             console.print(f"{name} was refused: {file.refused}")
-
-
-def operator_table(sizes: list[int], runs: int, model: str) -> Table:
-    """Measure one level on generated meshes: seconds, MiB, and trimesh's Loop over ours."""
-    table = Table(title=f"One level in memory, median of {runs} runs")
-    table.add_column("faces", justify="right")
-    for method in METHODS:
-        table.add_column(f"{method} s", justify="right")
-        table.add_column("MiB", justify="right")
-    table.add_column("trimesh / pns", justify="right")
-    for size in sizes:
-        measured = [measure_operator(size, method, runs, model) for method in METHODS]
-        cells = [cell for m in measured for cell in (f"{m.seconds:.3f}", f"{m.mib:.0f}")]
-        ratio = measured[2].seconds / measured[1].seconds
-        table.add_row(f"{size:,}", *cells, f"{ratio:.1f}")
-    return table
 
 
 def file_table(measured: dict[str, MeasuredFile], levels: int) -> Table:

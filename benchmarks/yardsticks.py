@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-MIB = 2**20
+from benchmarks.memory import MIB
 
 
 def copy_bandwidth(mib: int = 128) -> float:
@@ -26,15 +26,3 @@ def sgemm_rate(size: int = 1024) -> float:
     start = time.perf_counter()
     a @ a
     return 2 * size**3 / (time.perf_counter() - start)
-
-
-def numpy_second(faces: int = 80_000) -> float:
-    """Return the seconds of a sort and some gathers of numpy, of as many rows as faces."""
-    rng = np.random.default_rng(0)
-    keys, rows = rng.integers(0, 2**40, 3 * faces), rng.standard_normal((faces, 3))
-    index = rng.integers(0, faces, 3 * faces)
-    start = time.perf_counter()
-    np.sort(keys)
-    for _ in range(4):
-        np.take(rows, index, axis=0).sum(axis=0)
-    return time.perf_counter() - start

@@ -27,7 +27,7 @@ def measure_anew(path: Path, on_measured: Callable[[str], None]) -> None:
         raise ModelError(str(path), expected="a model file", found="none")
     data = path.read_bytes()
     card, scheme, metrics = check_file(data, path.stem), pns(load_model(path)), {}
-    for name in ONE_STEP if card.format == PAPER_FORMAT else TO_LIMIT:
+    for name in [ONE_STEP] if card.format == PAPER_FORMAT else TO_LIMIT:
         metrics[name] = improvements_as_data(MEASURES[name](scheme))
         on_measured(name)
     proto = onnx.load_from_string(data)

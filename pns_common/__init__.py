@@ -13,7 +13,7 @@ Where to read:
     carry/          what vertices and corners carry, refined with the mesh
     kernels/        compiled loops over elements
     model/          card, file, session: what a model is, and onnxruntime, which runs it
-    refinement      all levels; report beside it
+    refinement      all levels; refined: what comes out, and its report
     interop/        meshes of other libraries
 
 Names are imported when they are first used: ``import pns_common`` loads no compiler.
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from pns_common.model.file import load_model
     from pns_common.operator.scheme import Scheme, catmull_clark, loop, pns
     from pns_common.operator.sharpness import sharp_edges
-    from pns_common.refinement import Refinement, refine, refine_many
+    from pns_common.refined import Refinement
+    from pns_common.refinement import refine, refine_many
     from pns_common.version import VERSION as __version__  # noqa: N811
 
 _HOMES = {
@@ -43,7 +44,7 @@ _HOMES = {
     "ModelError": "errors",
     "ParameterError": "errors",
     "PnsError": "errors",
-    "Refinement": "refinement",
+    "Refinement": "refined",
     "Scheme": "operator.scheme",
     "catmull_clark": "operator.scheme",
     "clean": "mesh.mesh",

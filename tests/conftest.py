@@ -69,7 +69,7 @@ KINDS = {
 
 # What takes longest comes first, so that several test processes end together.
 LONGEST = (
-    "train/test_every_experiment.py",
+    "train/test_experiments.py",
     "service/http/test_serve.py",
     "test_wheel.py",
     "conformance/test_conformance.py",
@@ -83,8 +83,8 @@ LONGEST = (
     "docs/test_site.py",
     "train/test_adversaries.py",
     "train/test_certificates.py",
-    "train/test_pairs.py",
-    "train/test_train_command.py",
+    "train/test_data.py",
+    "train/test_training.py",
 )
 
 

@@ -20,7 +20,7 @@ from torch import Tensor
 
 from train.connectivity import Connectivity, next_corner
 from train.curve_rule import Curves, corner_share
-from train.loop_masks import loop_mask
+from train.loop_masks import loop_points
 from train.models.directed import Directed
 from train.reference import Step, Surroundings, fold_guard
 from train.tensors import dot, root, shortened, unit
@@ -234,7 +234,7 @@ class DirectedRule:
         edges, one = DirectedEdges(Surroundings(unmarked, points)), points.new_ones(())
         heads = self.network(edges.features, edges.graph)
         sharpened = self.sharpened(mesh, edges, heads)
-        base, middle = loop_mask(sharpened)(points), points[mesh.edges].mean(dim=1)
+        base, middle = loop_points(points, sharpened), points[mesh.edges].mean(dim=1)
         vertices = edges.mean_leaving(edges.world(heads[:, 3:6]))
         between = edges.over_edges(edges.world(heads[:, :3]))
         squares = torch.cat([edges.around.square[:, 0], dot(*[edges.along[: len(middle)]] * 2)])

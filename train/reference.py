@@ -14,14 +14,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from train.connectivity import Connectivity
-from train.loop_masks import loop_mask
+from train.loop_masks import loop_points
 from train.tensors import dot, ratio, root, shortened, unit
 
 # Below these a face has no area (of its squared sides), faces are antiparallel (1 + cosine), and a
@@ -178,7 +177,7 @@ def signed_18(around: Surroundings, edges: EdgeReading, frames: Frames) -> Float
     )
 
 
-EDGE_FEATURES = MappingProxyType({"paper-5": paper_5, "signed-18": signed_18})
+EDGE_FEATURES = {"paper-5": paper_5, "signed-18": signed_18}
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +212,7 @@ def on_edges(
     """Return Loop's step with something added to edge vertices."""
     none = points.new_zeros(mesh.vertex_count)
     return Step(
-        loop_mask(mesh)(points),
+        loop_points(points, mesh),
         torch.cat([torch.zeros_like(points), displacement]),
         torch.cat([none, envelope]),
         torch.cat([none, gate]),

@@ -22,14 +22,14 @@ COMMANDS = {
     ),
     "reproduce": (
         "train.experiments.command:reproduce_command",
-        "Make the paper's tables and figures again, and those that it leaves open.",
+        "Make the paper's tables and figures again.",
     ),
     "certify": (
         "train.certificates.command:certify_command",
         "Certify a model file, also one that someone else made; exit 1 if a certificate fails.",
     ),
     "validate": (
-        "train.experiments.beyond.validation:validate_command",
+        "train.experiments.validation:validate_command",
         "Print the validation table of a model.",
     ),
 }

@@ -34,13 +34,12 @@ PLATFORMS = {
     "macos-arm64": ("macosx_14_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
 PLATFORM_OF = {"Linux": "linux-x64", "Windows": "windows-x64", "Darwin": "macos-arm64"}
-PYTHON_TAG = """
-import platform, sys
-print("%d.%d" % sys.version_info[:2], platform.system())
-"""
-TOOL = """
-import bpy
+# What is asked of Blender's Python.
+FACTS = """
+import bpy, platform, sys
 from pathlib import Path
+print("%d.%d" % sys.version_info[:2])
+print(platform.system())
 scripts = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
 print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
 """
@@ -48,8 +47,7 @@ print(next(scripts.glob("addons_core/bl_pkg/cli/blender_ext.py")))
 
 def main(python: str, platform: str | None = None, library: str | None = None) -> None:
     """Build the zip, and let Blender validate what was packed."""
-    tool = said(python, "-c", TOOL).splitlines()[-1]
-    version, system = said(python, "-c", PYTHON_TAG).split()
+    version, system, tool = said(python, "-c", FACTS).splitlines()[-3:]
     platform = platform or PLATFORM_OF.get(system, system)
     if platform not in PLATFORMS:
         raise SystemExit(f"{platform}: expected one of {', '.join(PLATFORMS)}")
@@ -94,20 +92,10 @@ def collect_wheels(folder: Path, platform: str, version: str) -> None:
     ``version`` is that of Python, such as 3.11.
     """
     folder.mkdir(parents=True)
-    pip = (sys.executable, "-m", "pip", "--quiet")
-    said(
-        *pip,
-        "download",
-        "--no-deps",
-        "--only-binary=:all:",
-        *(f"--platform={tag}" for tag in PLATFORMS[platform]),
-        f"--python-version={version}",
-        "--dest",
-        folder,
-        "--constraint",
-        ROOT / "constraints.txt",
-        *REQUIRED,
-    )
+    tags = [f"--platform={tag}" for tag in PLATFORMS[platform]]
+    wanted = [f"--python-version={version}", "--constraint", ROOT / "constraints.txt", *REQUIRED]
+    pip = (sys.executable, "-m", "pip", "--quiet", "download", "--no-deps", "--only-binary=:all:")
+    said(*pip, *tags, "--dest", folder, *wanted)
 
 
 def library_wheel(folder: Path) -> None:

@@ -7,13 +7,11 @@ PYTHON has bpy; ZIP is the extension as `make addon` writes it.
 
 from __future__ import annotations
 
-import math
 import statistics
 import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -67,14 +65,8 @@ def longest_pieces(obj: bpy.types.Object, scheme: str) -> float:
     from bl_ext.user_default.pns_refine.run import Run, Share, key_of, refine_meshes
     from bl_ext.user_default.pns_refine.settings import choice_of
 
-    from pns_common import load_model
-    from pns_common.model.file import DEFAULT_MODEL
-
-    asked = SimpleNamespace(
-        scheme=scheme, levels=1, limit=False, crease_angle=math.pi, crease_lines=False
-    )
-    asked.uv_smooth, asked.border = "PRESERVE_BOUNDARIES", "ALL"
-    asked.model, asked.model_file, asked.budget = DEFAULT_MODEL, "", load_model().card.budget
+    asked = obj.data.pns_live
+    asked.scheme, asked.levels, asked.limit, asked.crease_lines = scheme, 1, False, False
     run = Run(refine_meshes([obj], choice_of(asked), Share()))
     longest, done = 0.0, False
     while not done:

@@ -32,10 +32,9 @@ def main(arguments: list[str] | None = None) -> None:
     stage.clear()
     panels = read(asked.folder, asked.field)
     width, height = build(panels, asked.turn, asked.field, asked.highest, asked.label)
-    pixels = round(asked.cell * width), round(asked.cell * height)
-    stage.prepare(*pixels, stage.Quality("CYCLES", asked.samples))
-    stage.picture(asked.output)
-    print(f"{asked.output}: {pixels[0]} × {pixels[1]}")
+    stage.picture(
+        asked.output, round(asked.cell * width), round(asked.cell * height), asked.samples
+    )
 
 
 Panels = dict[tuple[int, int], tuple[Shape, str]]
@@ -67,7 +66,7 @@ def build(
     """Put everything on stage; the picture's width and height in cells' widths."""
     rows, columns = (max(place[axis] for place in panels) for axis in (0, 1))
     shapes = [shape for shape, _ in panels.values()]
-    wide, high = sheet.extent(shapes, [turn])
+    wide, high = sheet.extent(shapes, turn)
     scale = (1 - 2 * MARGIN) / wide
     height = high / wide + NOTE
     total = rows * height + TITLE
@@ -80,7 +79,7 @@ def build(
             sheet.text(shape.title, across, top - 0.6 * TITLE, 0.07)
         sheet.text(note, across, along - height + 0.6 * NOTE, 0.055)
         material = colours if shape.fields else plain
-        sheet.place(shape, material, stage.at(across, along - (height - NOTE) / 2), scale, [turn])
+        sheet.place(shape, material, stage.at(across, along - (height - NOTE) / 2), scale, turn)
     places = ((r, c) for c in range(1, columns + 1) for r in range(1, rows + 1))
     free = next((place for place in places if place not in panels), (1, 1))
     sheet.legend(label, highest, left + free[1] - 0.5, top - TITLE - (free[0] - 0.5) * height)

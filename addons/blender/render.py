@@ -1,7 +1,6 @@
 """Render a mesh as a sheet: control, Loop, an untrained control and PNS, in several looks.
 
 PYTHON addons/blender/render.py MESH… -o SHEET.png [--looks clay zebra] [--levels 3]
-PYTHON addons/blender/render.py MESH… -o TURN.mp4 --frames 48      # a turntable
 
 MESH is a file, or suzanne, cube, cylinder or cone. PYTHON has bpy and the project's library.
 Several meshes make several rows of each look. The camera, the light and the scale of a row are
@@ -11,11 +10,8 @@ fixed, so its cells can be compared.
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
-
-import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -38,27 +34,10 @@ def main(arguments: list[str] | None = None) -> None:
             levels = max(1, asked.levels - 1) if look == "wire" else asked.levels
             shapes = [VARIANTS[name](mesh, levels, asked.model) for name in asked.variants]
             rows.append(sheet.Row(look, shapes))
-    count = asked.frames or 1
-    layout = sheet.build(rows, [asked.turn + 360 * frame / count for frame in range(count)])
-    width = round(asked.cell * layout.width)
-    # Encoders want even numbers.
-    height = 2 * round(asked.cell * layout.height / 2)
-    stage.prepare(width, height, stage.Quality(asked.engine.upper(), asked.samples))
-    if asked.frames:
-        turn(asked.frames)
-        stage.film(asked.output, asked.frames)
-    else:
-        stage.picture(asked.output)
-    print(f"{asked.output}: {width} × {height}")
-
-
-def turn(frames: int) -> None:
-    """Let every mesh go round once."""
-    for pivot in (o for o in bpy.data.objects if o.name.startswith("pivot")):
-        start = pivot.rotation_euler.z
-        for frame in range(1, frames + 1):
-            pivot.rotation_euler.z = start + 2 * math.pi * (frame - 1) / frames
-            pivot.keyframe_insert("rotation_euler", index=2, frame=frame)
+    width, height = sheet.build(rows, asked.turn)
+    stage.picture(
+        asked.output, round(asked.cell * width), round(asked.cell * height), asked.samples
+    )
 
 
 def parser() -> argparse.ArgumentParser:
@@ -75,8 +54,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--turn", type=float, default=0.0, help="degrees about the vertical axis")
     made.add_argument("--cell", type=int, default=320, help="pixels of a cell's width")
     made.add_argument("--samples", type=int, default=32)
-    made.add_argument("--engine", choices=["cycles", "eevee"], default="cycles")
-    made.add_argument("--frames", type=int, default=0, help="frames of a turntable; 0: a picture")
     return made
 
 

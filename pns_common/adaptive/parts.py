@@ -213,7 +213,8 @@ def with_rules_of(
     if len(mesh.wear):
         whole = made.edge_class != connectivity.BOUNDARY
         wear = np.where(whole, mesh.wear[edges], 0.0)
-        made = replace(made, wear=wear if wear.any() else NO_WEIGHTS)
+        found = np.where(wear > 0, mesh.found[edges], 0.0) if len(mesh.found) else NO_WEIGHTS
+        made = replace(made, wear=wear if wear.any() else NO_WEIGHTS, found=found)
     if len(mesh.vertex_sharpness):
         made = made.with_vertex_sharpness(mesh.vertex_sharpness[vertices])
     if len(mesh.soft_corners):

@@ -31,7 +31,7 @@ from pns_common.mesh.rows import marked
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
-from pns_common.refinement import Refinement, Step, check_coordinates, reference_length_of
+from pns_common.refined import Refinement, Step, check_coordinates, reference_length_of
 from pns_common.report import Report, limit_distances
 from pns_common.schemes.limit import limit_normals, limit_positions
 from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product

@@ -9,6 +9,7 @@ of a seam keep meeting. Creases and corners of the surface are those of the char
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -86,19 +87,25 @@ def charts_of(
     blocks: Blocks,
 ) -> list[Topology]:
     """Return the topologies of charts at each level, with the surface's sharpness inside."""
-    charts = list[Topology]()
+    charts, plain = list[Topology](), None
     count = int(points.max(initial=-1)) + 1
     for surface in topologies:
-        chart = (
-            base.split(charts[-1], blocks, inherit=False)
-            if charts
-            else build_topology((points, surface.offsets), count, blocks)
+        plain = chart = (
+            build_topology((points, surface.offsets), count, blocks)
+            if plain is None
+            else base.split(plain, blocks, inherit=False)
         )
         # The corners of both meshes correspond: an edge has the sharpness of that of its corner.
         if len(surface.sharp_edges) or len(surface.soft):
             edges = surface.corner_edges[chart.half_edges[:, 0]]
-            inside = np.where(surface.edge_class == EdgeClass.IRREGULAR, 0.0, surface.sharpness)
-            chart = chart.with_sharpness(inside[edges])
+            inside = surface.edge_class[edges] != EdgeClass.IRREGULAR
+            chart = chart.with_sharpness(np.where(inside, surface.sharpness[edges], 0.0))
+            if len(surface.wear):
+                inside &= plain.edge_class == EdgeClass.INTERIOR
+                kept = {"wear": surface.wear, "found": surface.found}
+                chart = replace(
+                    chart, **{k: np.where(inside, v[edges], 0.0) for k, v in kept.items() if len(v)}
+                )
         if surface.has_corners:
             vertex_of = np.zeros(chart.vertex_count, dtype=np.int64)
             vertex_of[chart.corners] = surface.corners

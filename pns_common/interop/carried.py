@@ -26,7 +26,8 @@ from pns_common.mesh.rows import distinct_rows, number_by_first_appearance
 from pns_common.mesh.topology import Topology, check_vertices
 from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks
-from pns_common.refinement import Refinement, refine
+from pns_common.refined import Refinement
+from pns_common.refinement import refine
 
 Data = Mapping[str, np.ndarray]
 NO_LINES = np.zeros((0, 2), dtype=np.int64)

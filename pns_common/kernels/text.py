@@ -102,7 +102,7 @@ def write_numbers(
     """Write rows of numbers by %.{digits}g, between parts of text.
 
     Args:
-        rows: (N, K) numbers, 0 or of 1e-11 ≤ |x| < 1e22.
+        rows: (N, K) numbers, 0 or of 1e-10 ≤ |x| < 1e22.
         digits: 1 … 12.
         parts: K + 1 texts, one after the other, of each row.
         ends: (K + 1,) where each of them ends.

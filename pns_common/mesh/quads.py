@@ -41,7 +41,7 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
     if not parent.plain:
         made = build_topology((corners, offsets), vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return (inheriting(made, parent) if inherit else made).worn(parent)
+        return (inheriting(made, parent) if inherit else made).worn(parent, inherit=inherit)
     source = parent if inherit else parent.without_creases()
     halves, arrays = np.empty((edge_count, 2), np.uint32), (parent.corners, parent.offsets)
     blocks.run(
@@ -75,4 +75,4 @@ def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> To
         plain=True,
         soft_corners=soft_corners,
     )
-    return made.worn(parent, halves)
+    return made.worn(parent, halves, inherit=inherit)

@@ -75,6 +75,8 @@ class Topology:
         plain: no face names a vertex twice, and no two triangles have the same vertices.
         wear: (E,) at how many more levels each edge that wears off is sharp, infinity for good, its
             last part in part; (0,) where none does.
+        found: (E,) learned sharpness of edges that wear off: they are at least so sharp; (0,) where
+            it is 0 at all.
         soft_corners: (V,) learned corner weight κ in [0, 1] of each vertex, which lasts as long as
             the sharpness of edges; (0,) where it is 0 at all.
     """
@@ -92,6 +94,7 @@ class Topology:
     plain: bool
     soft_corners: Float[np.ndarray, " SV"] = field(default_factory=lambda: NO_WEIGHTS)
     wear: Float[np.ndarray, " W"] = field(default_factory=lambda: NO_WEIGHTS)
+    found: Float[np.ndarray, " SW"] = field(default_factory=lambda: NO_WEIGHTS)
 
     @property
     def face_count(self) -> int:
@@ -179,18 +182,30 @@ class Topology:
         """The vertices on sharp and soft edges, and corners; None where there is none of all.
 
         Where sharpness is learned, corners too, soft edges do not count at the ends of boundaries,
-        so that meshes that share a boundary still meet there.
+        so that meshes that share a boundary still meet there. Edges that wear off at this level
+        count in part, as in OpenSubdiv: by the mean of what is left of them at each vertex.
         """
         if not (self.edge_class.any() or len(self.soft) or self.has_corners):
             return None
-        weights, neighbours = self._sharpest_of(self.soft)
-        if len(self.soft) and len(self.soft_corners):
-            on_boundary = self.edge_class == kernels.BOUNDARY
-            if on_boundary.any():
-                ends = np.unique(self.edges[on_boundary])
-                marked = np.where(self.wear > 0, self.soft, 0.0) if len(self.wear) else NO_WEIGHTS
-                at_ends, beside = self._sharpest_of(marked)
-                weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
+        weights, neighbours = self._three_sharpest(self.edge_class, self.soft)
+        ending = (self.wear > 0) & (self.wear <= 1)
+        if ending.any():
+            ends, left = self.edges[ending].reshape(-1), np.repeat(self.wear[ending], 2)
+            count = np.bincount(ends, minlength=self.vertex_count)
+            total = np.bincount(ends, left, self.vertex_count)
+            share = (total / np.maximum(count, 1))[:, None]
+            soft, found = (
+                rows if len(rows) else np.zeros(len(ending)) for rows in (self.soft, self.found)
+            )
+            soft, classes = np.where(ending, found, soft), self.edge_class.copy()
+            classes[ending] = kernels.INTERIOR
+            weights, neighbours = self._three_sharpest(classes, soft)
+            classes[ending] = kernels.CREASE
+            sharper, beside = self._three_sharpest(classes, soft)
+            # Where a curve is left without them, it goes on.
+            curve = weights[:, 1:2] > weights[:, 2:]
+            neighbours = np.where(curve, neighbours, beside)
+            weights = weights + share * (sharper - weights)
         if self.has_corners:
             corner = self.corner_weights
             rows = np.flatnonzero(corner)
@@ -198,13 +213,26 @@ class Topology:
             weights[rows] = corner + (1 - corner) * weights[rows]
         return SharpVertices(np.flatnonzero(weights[:, 1] > 0), weights, neighbours)
 
-    def _sharpest_of(
-        self, soft: Float[np.ndarray, " S"]
+    def _three_sharpest(
+        self, classes: Integer[np.ndarray, " E"], soft: Float[np.ndarray, " S"]
     ) -> tuple[Float[np.ndarray, "V 3"], UInt32[np.ndarray, "V 2"]]:
-        """Return ``SharpVertices``'s weights and neighbours of edges, with soft edges as given."""
+        """Return ``SharpVertices``'s weights and neighbours of edges of these classes and w."""
+        weights, neighbours = self._sharpest_of(classes, soft)
+        if len(soft) and len(self.soft_corners):
+            on_boundary = classes == kernels.BOUNDARY
+            if on_boundary.any():
+                ends = np.unique(self.edges[on_boundary])
+                marked = np.where(self.wear > 0, soft, 0.0) if len(self.wear) else NO_WEIGHTS
+                at_ends, beside = self._sharpest_of(classes, marked)
+                weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
+        return weights, neighbours
+
+    def _sharpest_of(
+        self, classes: Integer[np.ndarray, " E"], soft: Float[np.ndarray, " S"]
+    ) -> tuple[Float[np.ndarray, "V 3"], UInt32[np.ndarray, "V 2"]]:
         weights = np.zeros((self.vertex_count, 3))
         neighbours = np.zeros((self.vertex_count, 2), dtype=np.uint32)
-        loop.sharpest_edges(self.edges, self.edge_class, soft, weights, neighbours)
+        loop.sharpest_edges(self.edges, classes, soft, weights, neighbours)
         return weights, neighbours
 
     @cached_property
@@ -263,18 +291,30 @@ class Topology:
         soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
         if len(self.soft):
             soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
-        return replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        if len(self.wear):
+            found = np.where((self.wear > 0) & np.isfinite(self.wear), sharpness, 0.0)
+            made = replace(made, found=found if found.any() else NO_WEIGHTS)
+        return made
 
     def with_wear(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
         """Return a copy whose interior edges are sharp for so many levels, infinity for good."""
-        made = self.with_sharpness(np.minimum(sharpness, 1.0))
+        made = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
+        made = made.with_sharpness(np.minimum(sharpness, 1.0))
         wear = np.where(self.edge_class == kernels.INTERIOR, sharpness, 0.0)
         return replace(made, wear=wear if wear.any() else NO_WEIGHTS)
 
-    def worn(self, parent: Topology, halves: Integer[np.ndarray, "E 2"] | None = None) -> Topology:
+    def worn(
+        self,
+        parent: Topology,
+        halves: Integer[np.ndarray, "E 2"] | None = None,
+        *,
+        inherit: bool = True,
+    ) -> Topology:
         """Return the copy of a split in which edges that wear off are a level less sharp.
 
         ``halves`` are the edges that each edge of the parent was split into, if they are known.
+        ``inherit``: whether what is learned of them lasts.
         """
         if len(parent.wear) == 0:
             return self
@@ -288,7 +328,12 @@ class Topology:
         if len(soft):
             soft[own] = 0.0
         left[own] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
-        return replace(self, edge_class=classes, soft=soft).with_wear(left)
+        made = replace(self, edge_class=classes, soft=soft).with_wear(left)
+        if inherit and len(parent.found):
+            found = np.zeros(len(self.edges))
+            found[own] = parent.found[rows][:, None]
+            made = made.with_sharpness(found)
+        return made
 
     def with_border(self, rule: str) -> Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
@@ -333,7 +378,7 @@ class Topology:
     def without_creases(self) -> Topology:
         """Return a copy without creases, soft edges and corners."""
         classes = np.where(self.edge_class == kernels.CREASE, kernels.INTERIOR, self.edge_class)
-        kinds = "soft", "vertex_sharpness", "soft_corners", "wear"
+        kinds = "soft", "vertex_sharpness", "soft_corners", "wear", "found"
         none = dict.fromkeys(kinds, NO_WEIGHTS)
         return replace(self, edge_class=classes.astype(np.int8), **none)
 
@@ -443,7 +488,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
     if not parent.plain:
         made = build_topology(faces, vertex_count, blocks)
         made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return (inheriting(made, parent) if inherit else made).worn(parent)
+        return (inheriting(made, parent) if inherit else made).worn(parent, inherit=inherit)
     soft = parent.soft
     source = parent if inherit else parent.without_creases()
     face_count, edge_count = parent.face_count, len(parent.edges)
@@ -480,7 +525,7 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         plain=True,
         soft_corners=soft_corners,
     )
-    return made.worn(parent, halves)
+    return made.worn(parent, halves, inherit=inherit)
 
 
 def inheriting(made: Topology, parent: Topology) -> Topology:

@@ -23,7 +23,8 @@ from pns_common.mesh.rows import distinct_rows, dot, number_by_first_appearance
 from pns_common.mesh.topology import following
 from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks, available_threads
-from pns_common.refinement import Refinement, refine
+from pns_common.refined import Refinement
+from pns_common.refinement import refine
 from pns_common.report import Report
 from pns_common.schemes import CATMULL_CLARK
 

@@ -37,8 +37,7 @@ def main(output, frame, files):
     scene.frame_set(frame)
     look_at([corner for objects in groups for corner in evaluated(objects)])
     stage.light()
-    stage.prepare(WIDTH, HEIGHT, stage.Quality(samples=SAMPLES))
-    stage.picture(Path(output))
+    stage.picture(Path(output), WIDTH, HEIGHT, SAMPLES)
     print(json.dumps(descriptions))
 
 

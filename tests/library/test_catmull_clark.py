@@ -129,7 +129,10 @@ def test_every_soft_crease_equals_opensubdiv(name, sharpness):
     np.testing.assert_allclose(refined.vertices[refined.faces], expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("sharpness", [0.5, 1, 1.25, 2, 3.5, np.inf])
+@pytest.mark.parametrize(
+    "sharpness",
+    [[0.5], [1], [1.25], [2], [3.5], [np.inf], [0.25, 0.75, 0.5, 1], [3, 0.5, 1.25, 0.875]],
+)
 @pytest.mark.parametrize("scheme", ["catmull-clark", "loop"])
 @pytest.mark.parametrize("name", CREASES)
 def test_every_crease_that_wears_off_equals_opensubdiv(name, scheme, sharpness):
@@ -140,10 +143,11 @@ def test_every_crease_that_wears_off_equals_opensubdiv(name, scheme, sharpness):
     sides = {frozenset(pair) for f in faces for pair in zip(f, [*f[1:], f[0]], strict=True)}
     pairs = [pair for pair in CREASES[name] if frozenset(pair) in sides]
     points, levels = uneven(points), 3
-    creases = Creases(np.array(pairs), np.full(len(pairs), sharpness), wears=True, levels=1)
+    sharpness = np.resize(sharpness, len(pairs)).astype(float)
+    creases = Creases(np.array(pairs), sharpness, wears=True, levels=1)
     made = refine(Mesh(points, faces), scheme, levels, creases=creases)
     oracle = opensubdiv.loop if scheme == "loop" else opensubdiv.catmull_clark
-    given = min(sharpness, 10)
+    given = np.minimum(sharpness, 10)
     expected, *_ = oracle(points, faces, levels, pairs, sharpness=given)
     np.testing.assert_allclose(made.mesh.vertices[made.mesh.faces], expected, rtol=0, atol=1e-12)
 

@@ -1,9 +1,11 @@
 """Learned sharpness: weights within their gates, the same whatever is marked beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pns_common import Mesh, pns, sharp_edges
+from pns_common import Creases, Mesh, load_model, pns, sharp_edges
 from pns_common.operator.level import Level
 from pns_common.operator.sharpness import creases_by_name, shares_of_corners, shares_of_edges
 from pns_common.parallel import Blocks
@@ -11,6 +13,7 @@ from pns_common.schemes import LOOP
 from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, every_edge_class, prism, tilted_plane
 from tests.support.networks import default_model
+from tests.support.polygons import CUBE, CUBE_FACES
 
 SCHEME = pns(default_model(8, 1.0))
 RULE = SCHEME.rule
@@ -74,3 +77,16 @@ def test_automatic_creases_are_those_of_the_network():
     expected = first.edges[w > 1 / 2]
     found = sharp_edges(mesh, scheme=SCHEME)
     assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, expected.tolist()))
+
+
+def test_marks_that_wear_off_leave_what_the_networks_find():
+    mesh, scheme = Mesh(CUBE, CUBE_FACES).triangulated(), pns(load_model())
+    marked = Creases(mesh.topology().edges[:1].astype(np.int64), np.array([0.25]), wears=True)
+    both = replace(marked, learned=True, levels=scheme.creases.levels)
+    for levels in 1, 3:
+        found, beside, alone = (
+            refine(mesh, scheme, levels, creases=each).mesh.vertices
+            for each in ("auto", both, marked)
+        )
+        np.testing.assert_allclose(beside, found, atol=0.01)
+        assert np.abs(beside - alone).max() > 0.1

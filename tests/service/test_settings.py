@@ -121,6 +121,7 @@ def test_out_of_range_is_refused(name: str, value: object) -> None:
         ("memory", "4,5GiB", "'4,5GiB' is no size, such as 1.5GiB"),
         ("host", "", "it is empty: leave it out, or name something"),
         ("hosts", "", "it is empty: leave it out, or name something"),
+        *(("hosts", name, f"{name!r} is no host name") for name in ("g:80", "a*.example", "a/b")),
     ],
 )
 def test_what_is_refused_is_told_in_plain_words(name: str, value: str, says: str) -> None:

@@ -30,8 +30,8 @@ def _driver():
 def catmull_clark(points, faces, levels, creases=(), corners=(), sharpness=10):
     """Return (Q, 4) positions, limits and two limit tangents at the corners of refined quads.
 
-    ``creases`` are as sharp as ``sharpness``, at so many levels. ``corners`` are pairs: vertices,
-    and their sharpness. 10 and more is for good.
+    ``creases`` are as sharp as ``sharpness``, one or one each, at so many levels. ``corners`` are
+    pairs: vertices, and their sharpness. 10 and more is for good.
     """
     return _refined(4, points, faces, levels, creases, corners, sharpness)
 
@@ -49,7 +49,8 @@ def _refined(degree, points, faces, levels, creases, corners, sharpness):
     lines = [" ".join(map(str, counts))]
     lines += [" ".join(f"{x:.17g}" for x in point) for point in points]
     lines += [" ".join(map(str, [len(face), *map(int, face)])) for face in faces]
-    lines += [f"{a} {b} {sharpness}" for a, b in creases]
+    each = np.broadcast_to(sharpness, len(creases))
+    lines += [f"{a} {b} {s:.9g}" for (a, b), s in zip(creases, each, strict=True)]
     lines += [f"{v} {sharpness:.9g}" for v, sharpness in corners]
     ran = subprocess.run(
         [program], input="\n".join(lines), capture_output=True, text=True, check=True

@@ -1,11 +1,13 @@
-"""Methods that break one promise each: what the certificates must find."""
+"""Schemes that break one promise each: what the certificates must find."""
 
 from dataclasses import replace
 
+import numpy as np
 import torch
 
+from pns_common import Scheme
 from train.reference import Surroundings, edge_frames, on_edges, read_edges
-from train.refining import Method
+from train.refining import torch_rule
 
 BUDGET, GATE_SHARPNESS = 0.5, 10.0
 
@@ -21,19 +23,19 @@ def along_normal(amount, name="stand-in"):
         displacement = size[:, None] * frames.axes[:, :, 1]
         return on_edges(points, mesh, displacement, BUDGET * inside * frames.length**2, 0 * inside)
 
-    return Method(name, step)
+    return Scheme(name, rule=torch_rule(step), learned_levels=None)
 
 
-def shifted(method, edges=0.0, vertices=0.0):
-    """A method whose positions are all off by a fixed vector along x, which no ratio shows."""
+def shifted(scheme, edges=0.0, vertices=0.0):
+    """A scheme whose positions are all off by a fixed vector along x, which no ratio shows."""
 
-    def step(points, mesh, reference_length):
-        made = method.rule(points, mesh, reference_length)
-        shift = torch.zeros_like(made.base)
-        shift[: len(points), 0], shift[len(points) :, 0] = vertices, edges
-        return replace(made, base=made.base + shift)
+    def rule(level):
+        made = scheme.rule(level)
+        shift = np.zeros_like(made.points)
+        shift[: len(level.points), 0], shift[len(level.points) :, 0] = vertices, edges
+        return replace(made, points=made.points + shift)
 
-    return Method("shifted", step)
+    return Scheme("shifted", rule=rule, learned_levels=None)
 
 
 def gate(x):

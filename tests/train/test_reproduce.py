@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 import train.experiments.command as command
 import train.run
-from pns_common import MeshError
+from train.experiments.harness import reproduce as harness
 from train.experiments.harness.experiment import Column, Experiment, Figure, Outcome, Table
-from train.experiments.harness.laboratory import SMALL, Laboratory
+from train.experiments.harness.laboratory import SMALL, Laboratory, code
 from train.experiments.harness.page import markdown_page
 from train.experiments.harness.reproduce import content_key, read_record, reproduce
 from train.experiments.harness.style import panels
@@ -42,10 +42,6 @@ class Counting:
         )
 
 
-# The key reads the source of the module that the experiment's function lives in.
-Counting.__module__ = "train.experiments.paper.headline"
-
-
 @pytest.fixture
 def counting():
     return Counting()
@@ -57,51 +53,48 @@ def experiment(counting):
 
 
 def laboratory(tmp_path, scale=SMALL, checkpoints=None, published=None):
-    return Laboratory(scale, tmp_path / "networks", checkpoints, published, lambda *_: None)
+    return Laboratory(scale, tmp_path / "networks", checkpoints, published)
 
 
-def test_a_finished_experiment_is_not_run_again(tmp_path, counting, experiment):
-    first = reproduce(experiment, laboratory(tmp_path), tmp_path)
-    second = reproduce(experiment, laboratory(tmp_path), tmp_path)
-    assert counting.runs == 1
-    assert second == first
-    reproduce(experiment, laboratory(tmp_path), tmp_path, force=True)
-    assert counting.runs == 2
+def test_a_finished_experiment_is_run_again_where_anything_of_it_is_another(
+    tmp_path, counting, experiment
+):
+    def run(**options):
+        return reproduce(experiment, laboratory(tmp_path), tmp_path, **options), counting.runs
 
-
-def test_a_missing_file_or_a_broken_record_makes_it_run_again(tmp_path, counting, experiment):
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    (tmp_path / "counted.csv").unlink()
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    (tmp_path / "figures" / "line.pdf").unlink()
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    first, runs = run()
+    assert (run(), runs) == ((first, 1), 1)
+    assert run(force=True)[1] == 2
     record = tmp_path / "cache" / "counting.json"
+    for number, path in enumerate(("counted.csv", "figures/line.pdf"), start=3):
+        (tmp_path / path).unlink()
+        assert run()[1] == number
     record.write_text("{}")
     assert read_record(record) is None
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
-    assert counting.runs == 4
-
-
-def test_other_inputs_make_it_run_again(tmp_path, counting, experiment):
-    reproduce(experiment, laboratory(tmp_path), tmp_path)
+    assert run()[1] == 5
     reproduce(experiment, laboratory(tmp_path, scale=replace(SMALL, levels=3)), tmp_path)
-    assert counting.runs == 2
-    checkpoints = tmp_path / "given"
-    checkpoints.mkdir()
-    key = content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints))
-    (checkpoints / "paper.safetensors").write_bytes(b"other weights")
-    assert content_key(experiment, laboratory(tmp_path, checkpoints=checkpoints)) != key
+    assert counting.runs == 6
+
+
+def test_code_and_weights_that_are_given_count_as_inputs(tmp_path, monkeypatch, experiment):
     needing = replace(experiment, needs_published=True)
-    key = content_key(needing, laboratory(tmp_path, published=checkpoints))
-    (checkpoints / "weights.npz").write_bytes(b"other weights")
-    assert content_key(needing, laboratory(tmp_path, published=checkpoints)) != key
+    for given in ("checkpoints", "published"):
+        folder = tmp_path / given
+        folder.mkdir()
+        keys = set()
+        for content in (b"weights", b"other weights"):
+            (folder / "paper.safetensors").write_bytes(content)
+            keys.add(content_key(needing, laboratory(tmp_path, **{given: folder})))
+        assert len(keys) == 2
+    assert code() == code()
+    monkeypatch.setattr(harness, "code", lambda: b"other code")
+    assert content_key(needing, laboratory(tmp_path, published=folder)) not in keys
 
 
-def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, counting, experiment):
+def test_an_experiment_that_breaks_off_leaves_no_record(tmp_path, experiment):
     def broken(_):
         raise KeyboardInterrupt
 
-    broken.__module__ = Counting.__module__
     with pytest.raises(KeyboardInterrupt):
         reproduce(replace(experiment, run=broken), laboratory(tmp_path), tmp_path)
     assert not (tmp_path / "cache" / "counting.json").exists()
@@ -146,69 +139,48 @@ def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
         assert here.read_bytes().startswith({".png": b"\x89PNG", ".pdf": b"%PDF"}[here.suffix])
 
 
-def test_the_command_runs_one_experiment_and_writes_the_page(tmp_path, monkeypatch, experiment):
-    monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment})
-    monkeypatch.setattr(command, "FULL", SMALL)
-    arguments = ["reproduce", "counting", "--output", str(tmp_path)]
-    outcome = CliRunner().invoke(train.run.app, arguments, catch_exceptions=False)
-    assert outcome.exit_code == 0
-    assert "counting:" in outcome.output
-    page = (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert "## Counting runs" in page
+def invoke(*arguments):
+    return CliRunner().invoke(train.run.app, ["reproduce", *map(str, arguments)])
 
 
 def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, experiment):
     needing = replace(experiment, name="needing", needs_published=True)
     monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment, "needing": needing})
-    monkeypatch.setattr(command, "FULL", SMALL)
-    runner, output = CliRunner(), ["--output", str(tmp_path)]
-    unknown = runner.invoke(train.run.app, ["reproduce", "nothing", *output])
-    assert unknown.exit_code == 2
-    assert "counting, needing" in " ".join(unknown.output.split())
-    lacking = runner.invoke(train.run.app, ["reproduce", "needing", *output])
-    assert lacking.exit_code == 2
-    assert "--published" in lacking.output
-    assert counting.runs == 0
-    for folder in ("--checkpoints", "--published", "--assets"):
-        missing = [folder, str(tmp_path / "nowhere")]
-        misspelt = runner.invoke(train.run.app, ["reproduce", "counting", *output, *missing])
-        assert (misspelt.exit_code, counting.runs) == (2, 0)
-        assert folder in misspelt.output
-    listed = runner.invoke(train.run.app, ["reproduce", "--list"])
+    for arguments, named in (
+        (["nothing"], "counting, needing"),
+        (["needing"], "--published"),
+        (["counting", "--checkpoints", tmp_path / "nowhere"], "--checkpoints"),
+        (["counting", "--published", tmp_path / "nowhere"], "--published"),
+    ):
+        refused = invoke(*arguments, "--output", tmp_path)
+        assert refused.exit_code == 2
+        assert named in " ".join(refused.output.split())
+    listed = invoke("--list")
     assert listed.exit_code == 0
     lines = listed.output.splitlines()
     assert [line.split()[0] for line in lines] == ["counting", "needing"]
     assert lines[1].endswith("needs --published DIR)")
     assert counting.runs == 0
-    everything = runner.invoke(train.run.app, ["reproduce", *output])
-    assert everything.exit_code == 0
-    assert counting.runs == 1
 
 
-def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(
-    tmp_path, monkeypatch, experiment
-):
-    def cannot(laboratory):
-        raise MeshError("no file in [/meshes]", element="folder")
-
-    cannot.__module__ = Counting.__module__
-    monkeypatch.setattr(command, "EXPERIMENTS", {"cannot": replace(experiment, run=cannot)})
-    arguments = ["reproduce", "cannot", "--output", str(tmp_path)]
-    outcome = CliRunner().invoke(train.run.app, arguments)
+def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(tmp_path, monkeypatch):
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    outcome = invoke("published", "--published", folder, "--output", tmp_path / "results")
     assert outcome.exit_code == 1
-    assert "folder: no file in [/meshes]" in outcome.output
+    assert "neither" in outcome.output
 
 
 @pytest.mark.spawning
-def test_experiments_that_run_at_once_find_the_same(tmp_path):
-    # One trains a network, one refines by bundled models.
-    chosen = [EXPERIMENTS[name] for name in ("saddle", "spheres")]
+def test_experiments_that_run_at_once_find_the_same_and_write_the_page(tmp_path):
+    """One trains a network."""
+    chosen = [EXPERIMENTS[name] for name in ("saddle", "sphere-ridge")]
     pages = []
     for processes in (1, 2):
         output = tmp_path / str(processes)
-        lab = laboratory(output)
         console = Console(file=StringIO())
-        command.run_all(chosen, lab, output, console, processes, force=False)
+        command.run_all(chosen, laboratory(output), output, console, processes, force=False)
+        assert "saddle:" in console.file.getvalue()
         pages.append({path.name: path.read_bytes() for path in output.glob("*.*")})
     assert pages[0] == pages[1]
-    assert {"saddle.csv", "spheres.csv", "README.md"} <= set(pages[0])
+    assert {"saddle.csv", "sphere_ridge.csv", "README.md"} <= set(pages[0])

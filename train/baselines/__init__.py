@@ -1,4 +1,1 @@
-"""The methods that PNS is compared with: one `train.refining.Method` each.
-
-Loop and PNS themselves live in `pns_common.schemes`.
-"""
+"""The methods that PNS is compared with: rules of the library's schemes."""

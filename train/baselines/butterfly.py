@@ -5,14 +5,15 @@ topology. On the regular grid this is the eight-point butterfly of Dyn, Levin an
 """
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
-from train.baselines.placement import midpoints, placed_edges
-from train.connectivity import Connectivity, next_corner
-from train.reference import Step
-from train.refining import Method
+from pns_common import Scheme
+from pns_common.kernels.connectivity import BOUNDARY
+from pns_common.mesh.topology import Topology
+from pns_common.operator.formula import Additions
+from pns_common.operator.level import Level
+from train.baselines.placement import edges_of, midpoints, placed_edges
+from train.connectivity import next_corner
 
 REGULAR_VALENCE = 6
 ENDPOINT, OPPOSITE, WING = 1 / 2, 1 / 8, -1 / 16
@@ -20,39 +21,36 @@ STAR_CENTRE = 3 / 4
 CURVE_NEAR, CURVE_FAR = 9 / 16, -1 / 16
 
 
-def modified_butterfly() -> Method:
-    """Return the method. Old vertices stay; irregular edges take the midpoint."""
-
-    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-        edges = butterfly_edge_vertices(points, mesh)
-        return placed_edges(points, mesh, reference_length, edges, points)
-
-    return Method("butterfly", step)
+def modified_butterfly() -> Scheme:
+    """Return the scheme. Old vertices stay; irregular edges take the midpoint."""
+    return Scheme("butterfly", rule=_rule, learned_levels=None)
 
 
-def butterfly_edge_vertices(
-    points: Float[Tensor, "V 3"], mesh: Connectivity
-) -> Float[Tensor, "E 3"]:
+def _rule(level: Level) -> Additions:
+    return placed_edges(level, butterfly_edge_vertices(level), level.points)
+
+
+def butterfly_edge_vertices(level: Level) -> Float[np.ndarray, "E 3"]:
     """Return one vertex for each edge.
 
     An interior edge takes the star rule of its extraordinary end, the mean of both where both ends
     are, else the eight-point rule. What the eight-point stencil misses beyond a boundary is
     reflected across it, and a vertex on a boundary counts as regular, as in the source.
     """
-    placed, interior = midpoints(points, mesh), mesh.interior
-    boundary = torch.nonzero(mesh.boundary)[:, 0]
-    placed[boundary] = _boundary_points(points, mesh, boundary)
+    topology, placed = level.topology, midpoints(level)
+    boundary = np.flatnonzero(topology.edge_class == BOUNDARY)
+    placed[boundary] = _boundary_points(level, boundary)
     # One closed fan of a valence other than 6; a star needs three.
-    extraordinary = mesh.ringed & (mesh.sharpest[0][:, 0] == 0)
-    extraordinary &= (mesh.valence >= 3) & (mesh.valence != REGULAR_VALENCE)
-    star_sum, stars = torch.zeros_like(placed), torch.zeros(len(placed))
+    extraordinary = level.ringed & (topology.valence >= 3) & (topology.valence != REGULAR_VALENCE)
+    interior, twins = topology.interior, _twins(topology)
+    star_sum, stars = np.zeros_like(placed), np.zeros(len(placed))
     # Of the two half-edges of an edge, each starts at another end.
-    for half_edge in mesh.half_edges[interior].T:
-        rows = extraordinary[mesh.faces.reshape(-1)[half_edge]]
-        star_sum[interior[rows]] += _star_points(points, mesh, half_edge[rows])
+    for half_edge in topology.half_edges[interior].T:
+        rows = extraordinary[topology.corners[half_edge]]
+        star_sum[interior[rows]] += _star_points(level, twins, half_edge[rows])
         stars[interior[rows]] += 1
     regular = interior[stars[interior] == 0]
-    placed[regular] = _eight_points(points, mesh, regular)
+    placed[regular] = _eight_points(level, twins, regular)
     of_stars = stars > 0
     placed[of_stars] = star_sum[of_stars] / stars[of_stars, None]
     return placed
@@ -72,61 +70,70 @@ def star_weights(
 
 
 def _star_points(
-    points: Float[Tensor, "V 3"], mesh: Connectivity, half_edge: Int[Tensor, " N"]
-) -> Float[Tensor, "N 3"]:
+    level: Level, twins: Int[np.ndarray, " H"], half_edge: Int[np.ndarray, " N"]
+) -> Float[np.ndarray, "N 3"]:
     """Apply the star rule at the start of each half-edge, whose end is neighbour 0."""
-    vertex, twins = mesh.faces.reshape(-1), mesh.twins
+    points, vertex = level.points, level.topology.corners
     centre = vertex[half_edge]
-    valence, placed = mesh.valence[centre], STAR_CENTRE * points[centre]
-    outgoing, rows = half_edge.clone(), torch.arange(len(half_edge))
+    valence, placed = level.topology.valence[centre], STAR_CENTRE * points[centre]
+    outgoing, rows = half_edge.copy(), np.arange(len(half_edge))
     # Round the star neighbour by neighbour, for all stars at once.
-    for turn in range(int(valence.amax()) if len(valence) else 0):
+    for turn in range(valence.max(initial=0)):
         rows = rows[valence[rows] > turn]
-        weights = torch.from_numpy(star_weights(valence[rows].numpy(), turn))
+        weights = star_weights(valence[rows], turn)
         placed[rows] += weights[:, None] * points[vertex[next_corner(outgoing[rows])]]
         outgoing[rows] = twins[_previous(outgoing[rows])]
     return placed
 
 
 def _eight_points(
-    points: Float[Tensor, "V 3"], mesh: Connectivity, edges: Int[Tensor, " N"]
-) -> Float[Tensor, "N 3"]:
-    a, b, c, d = (points[column] for column in mesh.stencil[edges].T)
+    level: Level, twins: Int[np.ndarray, " H"], edges: Int[np.ndarray, " N"]
+) -> Float[np.ndarray, "N 3"]:
+    points, half_edges = level.points, level.topology.half_edges[edges]
+    a, b = points[edges_of(level)[edges]].transpose(1, 0, 2)
+    c, d = points[level.topology.corners[_previous(half_edges)]].transpose(1, 0, 2)
     placed = ENDPOINT * (a + b) + OPPOSITE * (c + d)
-    for half_edge in mesh.half_edges[edges].T:
+    for half_edge in half_edges.T:
         after = next_corner(half_edge)
         for wing in (after, next_corner(after)):
-            placed += WING * _across(points, mesh, wing)
+            placed += WING * _across(level, twins, wing)
     return placed
 
 
 def _across(
-    points: Float[Tensor, "V 3"], mesh: Connectivity, half_edge: Int[Tensor, " N"]
-) -> Float[Tensor, "N 3"]:
+    level: Level, twins: Int[np.ndarray, " H"], half_edge: Int[np.ndarray, " N"]
+) -> Float[np.ndarray, "N 3"]:
     """Return the vertex beyond each half-edge; its own face's vertex reflected where none is."""
-    vertex, other = mesh.faces.reshape(-1), mesh.twins[half_edge]
-    beyond = points[vertex[_previous(torch.where(other < 0, half_edge, other))]]
+    points, vertex, other = level.points, level.topology.corners, twins[half_edge]
+    beyond = points[vertex[_previous(np.where(other < 0, half_edge, other))]]
     start, end = vertex[half_edge], vertex[next_corner(half_edge)]
     reflected = points[start] + points[end] - points[vertex[_previous(half_edge)]]
-    return torch.where((other < 0)[:, None], reflected, beyond)
+    return np.where((other < 0)[:, None], reflected, beyond)
 
 
-def _previous(half_edge: Int[Tensor, " N"]) -> Int[Tensor, " N"]:
+def _twins(topology: Topology) -> Int[np.ndarray, " H"]:
+    """Return the half-edge on the other side of each; −1 where its edge is not interior."""
+    twins = np.full(len(topology.corners), -1, dtype=np.int64)
+    here, there = topology.half_edges[topology.interior].T
+    twins[here], twins[there] = there, here
+    return twins
+
+
+def _previous(half_edge: Int[np.ndarray, "*N"]) -> Int[np.ndarray, "*N"]:
     return next_corner(next_corner(half_edge))
 
 
-def _boundary_points(
-    points: Float[Tensor, "V 3"], mesh: Connectivity, edges: Int[Tensor, " N"]
-) -> Float[Tensor, "N 3"]:
+def _boundary_points(level: Level, edges: Int[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
     """Apply the four-point curve rule; where the boundary does not go on, its end is reflected."""
-    a, b = mesh.edges[edges].T
-    along, back = torch.cat([a, b]), torch.cat([b, a])
-    neighbour_sum = torch.zeros_like(points).index_add(0, along, points[back])
-    count = torch.bincount(along, minlength=len(points))
-    passes = (count == 2) & (mesh.sharpest[0][:, 2] == 0)
+    points, (a, b) = level.points, edges_of(level)[edges].T
+    along, back = np.concatenate([a, b]), np.concatenate([b, a])
+    neighbour_sum = np.zeros_like(points)
+    np.add.at(neighbour_sum, along, points[back])
+    passes = np.bincount(along, minlength=len(points)) == 2
+    passes &= level.topology.sharp_count == 2 if len(edges) else False
 
-    def beyond(end: Int[Tensor, " N"], other: Int[Tensor, " N"]) -> Float[Tensor, "N 3"]:
+    def beyond(end: Int[np.ndarray, " N"], other: Int[np.ndarray, " N"]) -> np.ndarray:
         next_on_curve = neighbour_sum[end] - points[other]
-        return torch.where(passes[end][:, None], next_on_curve, 2 * points[end] - points[other])
+        return np.where(passes[end][:, None], next_on_curve, 2 * points[end] - points[other])
 
     return CURVE_NEAR * (points[a] + points[b]) + CURVE_FAR * (beyond(a, b) + beyond(b, a))

@@ -1,42 +1,35 @@
 """The paper's baselines that place edge vertices: a blend with Butterfly, and a fitted push."""
 
-from dataclasses import replace
-
-import torch
+import numpy as np
 from jaxtyping import Float
-from torch import Tensor
 
+from pns_common import Scheme
+from pns_common.operator.formula import Additions
+from pns_common.operator.level import Level
+from pns_common.parallel import Blocks
+from pns_common.schemes.loop import LOOP
 from train.baselines.butterfly import butterfly_edge_vertices
-from train.baselines.placement import placed_edges
-from train.connectivity import Connectivity, connect
+from train.baselines.placement import edge_normals, edges_of, placed_edges
 from train.data.datasets import Dataset
-from train.loop_masks import loop_mask
-from train.reference import Step, Surroundings, edge_frames, read_edges
-from train.refining import Method
 from train.surfaces.implicit import signed_distance, unit_normal
-from train.tensors import dot
 
 
-def curvature_adaptive(gate_sharpness: float) -> Method:
+def curvature_adaptive(gate_sharpness: float) -> Scheme:
     """Return Loop where the mesh is flat, Butterfly where it bends.
 
     q = (1 − γ) Loop + γ Butterfly with the operator's own gate γ = tanh(c x²); old vertices,
     boundary and irregular edges are Loop's. Source: paper, Setup, baselines, and metrics.
     """
 
-    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-        around = Surroundings(mesh, points)
-        frames = edge_frames(read_edges(around, first_face=True), first_face=True)
-        gate = torch.where(mesh.paired, torch.tanh(gate_sharpness * frames.curvature**2), 0.0)
-        loop = loop_mask(mesh)(points)[mesh.vertex_count :]
-        edges = loop + gate[:, None] * (butterfly_edge_vertices(points, mesh) - loop)
-        placed = placed_edges(points, mesh, reference_length, edges)
-        return replace(placed, gate=torch.cat([points.new_zeros(len(points)), gate]))
+    def rule(level: Level) -> Additions:
+        gate, loop = np.tanh(gate_sharpness * level.edges.jumps**2), _loop_edges(level)
+        edges = loop + gate[:, None] * (butterfly_edge_vertices(level) - loop)
+        return placed_edges(level, edges, gate=gate)
 
-    return Method("curvature-adaptive", step)
+    return Scheme("curvature-adaptive", rule=rule, learned_levels=None)
 
 
-def normal_displacement(scalar: float) -> Method:
+def normal_displacement(scalar: float) -> Scheme:
     """Return Loop's edge vertex pushed along the mean face normal by one fitted scalar.
 
     q = q0 + s h N, h the edge's length, so that s has no unit; boundary and irregular edges are
@@ -44,12 +37,10 @@ def normal_displacement(scalar: float) -> Method:
     baseline and gives no formula.
     """
 
-    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-        loop = loop_mask(mesh)(points)[mesh.vertex_count :]
-        edges = loop + scalar * _unit_push(points, mesh)
-        return placed_edges(points, mesh, reference_length, edges)
+    def rule(level: Level) -> Additions:
+        return placed_edges(level, _loop_edges(level) + scalar * _unit_push(level))
 
-    return Method("normal-displacement", step)
+    return Scheme("normal-displacement", rule=rule, learned_levels=None)
 
 
 def fit_scalar(dataset: Dataset) -> float:
@@ -59,18 +50,25 @@ def fit_scalar(dataset: Dataset) -> float:
     """
     numerator = denominator = 0.0
     for instance in dataset.instances:
-        points = torch.tensor(instance.mesh.vertices)
-        mesh = connect(instance.mesh.faces, len(points))
-        start = loop_mask(mesh)(points)[len(points) + mesh.interior]
-        push = _unit_push(points, mesh)[mesh.interior]
-        gain = dot(push, unit_normal(instance.surface, start))
+        mesh = instance.mesh
+        level = Level(mesh.vertices, mesh.topology(), LOOP, None, Blocks())
+        rows = level.topology.interior
+        start, push = _loop_edges(level)[rows], _unit_push(level)[rows]
+        gain = (push * unit_normal(instance.surface, start)).sum(axis=1)
         numerator -= float((gain * signed_distance(instance.surface, start)).sum())
         denominator += float((gain**2).sum())
     return numerator / denominator
 
 
-def _unit_push(points: Float[Tensor, "V 3"], mesh: Connectivity) -> Float[Tensor, "E 3"]:
-    """Return h N of each interior edge; a fallback frame knows no normal of the surface."""
-    frames = edge_frames(read_edges(Surroundings(mesh, points), first_face=True), first_face=True)
-    push = frames.length[:, None] * frames.axes[:, :, 1]
-    return torch.where(frames.degenerate[:, None], 0.0, push)
+def _loop_edges(level: Level) -> Float[np.ndarray, "E 3"]:
+    return level.base.place(level.points, level.topology, level.blocks)[len(level.points) :]
+
+
+def _unit_push(level: Level) -> Float[np.ndarray, "E 3"]:
+    """Return h N of each interior edge, N at a right angle to it."""
+    start, end = level.points[edges_of(level)].transpose(1, 0, 2)
+    length = np.linalg.norm(end - start, axis=1, keepdims=True)
+    along, normal = (end - start) / np.where(length > 0, length, 1.0), edge_normals(level)
+    normal = normal - (normal * along).sum(axis=1, keepdims=True) * along
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return length * normal / np.where(size > 0, size, 1.0)

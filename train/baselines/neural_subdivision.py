@@ -21,8 +21,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from pns_common import Scheme
 from pns_common.files import replace_file
-from train.baselines.placement import midpoints, placed_edges
+from pns_common.operator.formula import Additions
+from pns_common.operator.level import Level
+from train.baselines.placement import placed_edges
 from train.connectivity import Connectivity, connect, next_corner
 from train.data.pair_store import make_pairs
 from train.fitting.determinism import deterministic
@@ -30,8 +33,6 @@ from train.fitting.pairs_trainer import PairPool, descend
 from train.fitting.training_pair import TrainingPair
 from train.models.networks import perceptron
 from train.models.recipe import OnPairs, Recipe
-from train.reference import Step
-from train.refining import Method, loop_rule
 from train.tensors import dot, ratio, root, unit
 
 WEIGHTS = Path(__file__).with_suffix(".safetensors")
@@ -89,22 +90,27 @@ class HalfFlapNets(nn.Module):
         free = mesh.ringed[:, None]
         vertices = points + torch.where(free, mean(moved(of_vertices)), 0.0)
         pairs = moved(asked(self.edge, mean(of_vertices[:, 3:]))).reshape(2, -1, 3)
-        edges = midpoints(points, mesh)
+        edges = points[mesh.edges].mean(dim=1)
         paired = torch.nonzero(mesh.paired)[:, 0]
         return vertices, edges.index_add(0, paired, pairs.mean(dim=0))
 
 
-def neural_subdivision(networks: HalfFlapNets | None = None) -> Method:
-    """Return the method, by the networks that are kept beside this file unless others are given."""
+def neural_subdivision(networks: HalfFlapNets | None = None) -> Scheme:
+    """Return the scheme, by the networks that are kept beside this file unless others are given."""
     kept = networks or load_networks()
 
-    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-        if not mesh.paired.any():
-            return loop_rule(points, mesh, reference_length)
-        vertices, edges = kept.placed(points, mesh)
-        return placed_edges(points, mesh, reference_length, edges, vertices)
+    def rule(level: Level) -> Additions:
+        if len(level.topology.interior) == 0:
+            return placed_edges(
+                level,
+                level.base.place(level.points, level.topology, level.blocks)[len(level.points) :],
+            )
+        mesh = connect(level.topology.faces, len(level.points))
+        with torch.no_grad():
+            vertices, edges = kept.placed(torch.tensor(level.points), mesh)
+        return placed_edges(level, edges.numpy(), vertices.numpy())
 
-    return Method("neural-subdivision", step, learned_levels=LEVELS)
+    return Scheme("neural-subdivision", rule=rule, learned_levels=LEVELS)
 
 
 def load_networks() -> HalfFlapNets:

@@ -7,23 +7,21 @@ fewer than five neighbours takes the solution of least norm.
 """
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
-from train.baselines.placement import midpoints, placed_edges
-from train.connectivity import Connectivity
-from train.reference import Step, Surroundings
-from train.refining import Method
-from train.tensors import unit
+from pns_common import Scheme
+from pns_common.kernels.connectivity import INTERIOR
+from pns_common.operator.formula import Additions
+from pns_common.operator.level import Level
+from train.baselines.placement import edges_of, midpoints, placed_edges, vertex_normals
 
 # Of the normal equations in ring units, so of squared condition: below it a direction is not seen.
 SMALLEST_SINGULAR = 1e-10
 
 
-def quadric_fit() -> Method:
-    """Return the method. Old vertices stay; boundary and irregular edges take the midpoint."""
-    return Method("quadric", _step)
+def quadric_fit() -> Scheme:
+    """Return the scheme. Old vertices stay; boundary and irregular edges take the midpoint."""
+    return Scheme("quadric", rule=_rule, learned_levels=None)
 
 
 def quadric_edge_points(
@@ -56,12 +54,10 @@ def quadric_edge_points(
     return placed.reshape(-1, 2, 3).mean(axis=1)
 
 
-def _step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-    axes = unit(Surroundings(mesh, points).mean_normal)
-    fitted = quadric_edge_points(points.numpy(), mesh.edges.numpy(), axes.numpy())
-    interior = (mesh.paired & (mesh.sharpness < 1))[:, None]
-    edges = torch.where(interior, torch.from_numpy(fitted), midpoints(points, mesh))
-    return placed_edges(points, mesh, reference_length, edges, points)
+def _rule(level: Level) -> Additions:
+    fitted = quadric_edge_points(level.points, edges_of(level), vertex_normals(level))
+    interior = (level.topology.edge_class == INTERIOR)[:, None]
+    return placed_edges(level, np.where(interior, fitted, midpoints(level)), level.points)
 
 
 def _monomials(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -27,9 +27,6 @@ from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.reference import Step
 
-# Called after each step with the number of steps done and the value found.
-OnStep = Callable[[int, float], None]
-
 # Adam's step: weights and vertices are both of size one.
 RATE = 0.02
 
@@ -88,7 +85,6 @@ def ascend(
     variables: Sequence[Tensor],
     look: Callable[[], tuple[Float[Tensor, ""], float]],
     steps: int,
-    on_step: OnStep,
 ) -> tuple[float, ...]:
     """Climb by Adam; `look` returns the objective and the value that is recorded."""
     values: list[float] = []
@@ -100,11 +96,10 @@ def ascend(
             objective.backward()
             optimiser.step()
             values.append(value)
-            on_step(len(values), value)
     return tuple(values)
 
 
-def proximity_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
+def proximity_attack(recipe: Recipe, steps: int) -> Attack:
     """Maximise the proximity ratio ‖q − q0‖ / (C h²); it must find 1 and never pass it."""
     operator, mesh = initial_operator(recipe), bumpy_sphere(recipe.seed)
     level = connect(mesh.faces, len(mesh.vertices))
@@ -119,11 +114,11 @@ def proximity_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
         ratio, _ = worst_ratio(control, refined, recipe.budget, base)
         return objective, ratio
 
-    values = ascend([points, *operator.weights], look, steps, on_step)
-    return _attack("proximity ratio", AT_MOST, values, operator, _mesh(points, mesh))
+    values = ascend([points, *operator.weights], look, steps)
+    return Attack("proximity ratio", AT_MOST, values, operator.network, _mesh(points, mesh))
 
 
-def equivariance_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
+def equivariance_attack(recipe: Recipe, steps: int) -> Attack:
     """Maximise ‖S(gM) − g S(M)‖ over weights, mesh and, at random, the rigid motion g.
 
     Ill-conditioned frames are left out, as in the certificate.
@@ -144,13 +139,11 @@ def equivariance_attack(recipe: Recipe, steps: int, on_step: OnStep) -> Attack:
         # Scaled up, or its square would be lost below Adam's own ε.
         return ((kept / EXACT) ** 2).sum(), value
 
-    values = ascend([points, *operator.weights], look, steps, on_step)
-    return _attack("equivariance", EXACT, values, operator, _mesh(points, mesh))
+    values = ascend([points, *operator.weights], look, steps)
+    return Attack("equivariance", EXACT, values, operator.network, _mesh(points, mesh))
 
 
-def affine_attack(
-    recipe: Recipe, turn: Float[np.ndarray, "3 3"], cap: float, steps: int, on_step: OnStep
-) -> Attack:
+def affine_attack(recipe: Recipe, turn: Float[np.ndarray, "3 3"], cap: float, steps: int) -> Attack:
     """Maximise ‖δ‖ / h² on planar meshes, over weights and vertices that slide in the plane.
 
     Args:
@@ -172,15 +165,9 @@ def affine_attack(
         ratio = operator(points, level).ratio
         return (ratio / TURNED).sum(), recipe.budget * float(ratio.detach().max())
 
-    values = ascend([slide, *operator.weights], look, steps, on_step)
+    values = ascend([slide, *operator.weights], look, steps)
     plane_mesh = Mesh(lay().detach().numpy(), grid_faces())
-    return _attack("affine reproduction", cap, values, operator, plane_mesh)
-
-
-def _attack(
-    name: str, cap: float, values: tuple[float, ...], operator: Operator, mesh: Mesh
-) -> Attack:
-    return Attack(name, cap, values, operator.network, mesh)
+    return Attack("affine reproduction", cap, values, operator.network, plane_mesh)
 
 
 def _mesh(points: Float[Tensor, "V 3"], like: Mesh) -> Mesh:

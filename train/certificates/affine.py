@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pns_common import Mesh
-from train.certificates.bases import LOOP
 from train.certificates.bodies import Body, random_motion
 from train.certificates.step import step
 from train.certificates.subject import Certificate, Subject, worst
-from train.refining import AnyScheme, loop_like, refine
+from train.refining import refine
 
 LEVELS = 2
 
@@ -53,20 +52,15 @@ def _off_base(subject: Subject, mesh: Mesh, axis: int) -> float:
     """
     refined, base = (
         refine(mesh, rules, LEVELS, 1.0, creases="auto").mesh.vertices
-        for rules in (subject.scheme, _base_of(subject))
+        for rules in (subject.scheme, subject.base.scheme)
     )
     if not subject.moves_curves:
         return float(np.abs(refined - base).max())
     across = (axis + 2) % 3
-    first, plain = (step(rules, mesh).positions for rules in (subject.scheme, _base_of(subject)))
+    first, plain = (step(rules, mesh).positions for rules in (subject.scheme, subject.base.scheme))
     inside = subject.base.plain(mesh.vertices, mesh.polygons).curve_reach == 0
     out_of_plane = np.abs(refined[:, across] - base[:, across]).max()
     return float(max(np.abs(first - plain)[inside].max(initial=0), out_of_plane))
-
-
-def _base_of(subject: Subject) -> AnyScheme:
-    """Return the base by the code that runs the scheme, with its rounding."""
-    return loop_like(subject.scheme) if subject.base is LOOP else subject.base.scheme
 
 
 def _turned(subject: Subject, flat: Sequence[Body], seed: int) -> Certificate:

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common import Mesh
+from pns_common import Mesh, Scheme
 from pns_common.model.card import DIRECTED_FORMAT
 from train.certificates.bodies import Body, random_motion
 from train.certificates.step import step
 from train.certificates.subject import Certificate, Subject, worst
-from train.refining import AnyScheme, Creases
+from train.refining import Creases
 from train.vectors import norm, unit
 
 EXACT = 1e-12
@@ -44,7 +44,7 @@ def equivariance(subject: Subject, bodies: Sequence[Body], seed: int) -> list[Ce
 
 def _certify(
     subject: Subject,
-    scheme: AnyScheme,
+    scheme: Scheme,
     bodies: Sequence[Body],
     seed: int,
     how: str,
@@ -69,7 +69,7 @@ def _certify(
 
 
 def discrepancy(
-    scheme: AnyScheme,
+    scheme: Scheme,
     mesh: Mesh,
     turn: Float[np.ndarray, "3 3"],
     shift: Float[np.ndarray, "3"],

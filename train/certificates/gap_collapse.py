@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from pns_common import pns
-from train.certificates.adversary import OnStep, Operator, ascend, initial_operator
+from train.certificates.adversary import Operator, ascend, initial_operator
 from train.certificates.planar_spectrum import LIFTS
 from train.connectivity import connect
 from train.models.networks import BoundedNet
@@ -60,7 +60,7 @@ class GapAttack:
     network: BoundedNet
 
 
-def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> GapAttack:
+def gap_attack(recipe: Recipe, valence: int, steps: int) -> GapAttack:
     """Minimise the signed Reif margin of a star lifted by 0.4, over weights and vertices.
 
     The tangent eigenvalues are followed from the flat star to the lifted one, and from there along
@@ -83,7 +83,7 @@ def gap_attack(recipe: Recipe, valence: int, steps: int, on_step: OnStep) -> Gap
         slope = torch.from_numpy(basis @ margin_gradient(spectrum) @ basis.T)
         return -(slope * matrix).sum(), spectrum.margin
 
-    margins = ascend([sway, *operator.weights], look, steps, on_step)
+    margins = ascend([sway, *operator.weights], look, steps)
     after = copies.follow(operator, SWAY * SPOKE * torch.tanh(sway.detach()), basis).margin
     return GapAttack(valence, recipe.budget, before, after, margins, operator.network)
 

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pns_common import Scheme
 from train.certificates.bases import LOOP, Base
 from train.certificates.subject import Certificate, Kind, Subject, worst
-from train.refining import AnyScheme, refine
+from train.refining import refine
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
@@ -63,14 +64,14 @@ def planar_spectrum(subject: Subject, valences: Sequence[int]) -> list[Certifica
     ]
 
 
-def spectrum(scheme: AnyScheme, valence: int, base: Base = LOOP) -> np.ndarray:
+def spectrum(scheme: Scheme, valence: int, base: Base = LOOP) -> np.ndarray:
     """Return |λ| of the linearisation at a flat star, largest first, translations left out."""
     star = closed_star(scheme, valence, FINE, base.star)(0.0)
     matrix = without_translations(jacobian(scheme, star, FINE))
     return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
 
 
-def derivative_of_departure(scheme: AnyScheme, valence: int, base: Base = LOOP) -> float:
+def derivative_of_departure(scheme: Scheme, valence: int, base: Base = LOOP) -> float:
     """Return the largest ‖S − S_base‖ / ε of a flat star moved by a tiny ε in any inner coordinate.
 
     One-sided: a gate with a kink at flat faces cancels in central differences, and automatic

@@ -18,7 +18,7 @@ from train.certificates.bodies import Body
 from train.certificates.displacement import AT_MOST
 from train.certificates.step import rounding, step
 from train.certificates.subject import Certificate, Kind, Subject, farthest, worst
-from train.refining import refine
+from train.refining import figures, refine
 from train.vectors import face_normals
 
 # Powers of two: scaling is exact. Normals need small ones to be in the linear regime.
@@ -121,7 +121,7 @@ def regular_smoothness(subject: Subject, torus: Mesh) -> Certificate:
     none is kept.
     """
     refined = refine(torus, subject.scheme, LEVELS, 1.0, creases=None)
-    jumps = np.array([level.normal_jump for level in refined.levels])
+    jumps = np.array([level.normal_jump for level in figures(refined)])
     order = float(np.log2(jumps[-2] / jumps[-1])) if jumps[-1] > 0 else np.inf
     where = f"bumpy torus, level {LEVELS}: largest jump {np.degrees(jumps[-1]):.1f}°"
     name = "normals settle in regular regions"

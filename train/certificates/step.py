@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Mesh
+from pns_common import Mesh, Scheme
 from train.certificates.bodies import Body
 from train.certificates.subject import Subject
-from train.refining import AnyScheme, refine
+from train.refining import refine
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +27,14 @@ class Step:
     positions: Float[np.ndarray, "N 3"]
     ratio: Float[np.ndarray, " N"]
 
-    def added(self, base: AnyScheme, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    def added(self, base: Scheme, envelope: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """Return ‖δ‖ from positions and a base's; where these round, from ratio and envelope."""
         apart = np.linalg.norm(self.positions - step(base, self.mesh).positions, axis=1)
         return np.where(apart <= rounding(self.mesh), self.ratio * envelope, apart)
 
 
 def step(
-    scheme: AnyScheme,
+    scheme: Scheme,
     mesh: Mesh,
     creases: Int[np.ndarray, "N 2"] | Literal["auto"] | None = None,
 ) -> Step:

@@ -8,12 +8,11 @@ from typing import TypeVar
 
 from torch import nn
 
-from pns_common import pns
+from pns_common import Scheme, pns
 from pns_common.model.card import PAPER_FORMAT, ModelCard
 from pns_common.model.session import Model
 from train.certificates.bases import CATMULL_CLARK, LOOP, Base
 from train.models.torch_model import TorchModel
-from train.refining import AnyScheme
 
 Trained = TypeVar("Trained", bound=nn.Module)
 
@@ -40,11 +39,11 @@ class Subject:
     """
 
     name: str
-    scheme: AnyScheme
-    exact: AnyScheme
+    scheme: Scheme
+    exact: Scheme
     budget: float
     card: ModelCard | None = None
-    unbounded: AnyScheme | None = None
+    unbounded: Scheme | None = None
 
     @property
     def is_single_precision(self) -> bool:

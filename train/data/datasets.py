@@ -5,7 +5,6 @@ The draws are exact: the published instances come out again to float32 rounding.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import torch
@@ -113,15 +112,13 @@ def _mesh(vertices: Float[torch.Tensor, "V 3"]) -> Mesh:
     return Mesh(vertices.numpy().astype(np.float64), grid_faces())
 
 
-DATASETS: Mapping[str, Callable[[], Dataset]] = MappingProxyType(
-    {
-        "ridge-training": ridge_training,
-        "ridge-held-out": ridge_held_out,
-        "saddle-training": saddle_training,
-        "saddle-held-out": saddle_held_out,
-        "sphere-ridge-held-out": sphere_ridge_held_out,
-    }
-)
+DATASETS: Mapping[str, Callable[[], Dataset]] = {
+    "ridge-training": ridge_training,
+    "ridge-held-out": ridge_held_out,
+    "saddle-training": saddle_training,
+    "saddle-held-out": saddle_held_out,
+    "sphere-ridge-held-out": sphere_ridge_held_out,
+}
 
 
 # Vertices along one side of the patch.

@@ -10,19 +10,6 @@ from scipy.sparse.csgraph import connected_components
 from pns_common import Mesh, MeshError, clean
 from train.connectivity import connect
 
-# .npz: arrays `vertices` and `faces`.
-FORMATS = (".glb", ".gltf", ".npz", ".obj", ".off", ".ply", ".stl")
-# A file whose stem ends so holds a control mesh.
-CONTROL_ENDING = "_control_mesh"
-
-
-def asset_files(folder: Path) -> list[Path]:
-    """Return the mesh files that lie in a folder itself, by name; folders in it are not read."""
-    return sorted(
-        (path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in FORMATS),
-        key=lambda path: path.name.lower(),
-    )
-
 
 def welded(mesh: Mesh) -> Mesh:
     """Return a mesh whose vertices at exactly one position are one, without degenerate faces.

@@ -6,7 +6,6 @@ its kind.
 
 import warnings
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any
 
 import fast_simplification
@@ -17,17 +16,10 @@ import pyvista
 from numpy.typing import ArrayLike
 from pyvista.core.errors import PyVistaDeprecationWarning
 
-from pns_common import Mesh, MeshError, clean
-from train.data.dense_meshes import largest_part
+from pns_common import Mesh, clean
 
 # How fast fast-simplification raises its threshold: below its own 7, for better triangles.
 AGGRESSIVENESS = 5.0
-
-# Share of the simplification that its largest part has to hold.
-LEAST_KEPT = 0.8
-
-# A result is used where its faces are within this factor of the target.
-CLOSENESS = 1.6
 
 # Vertices of the dense mesh over those of its clusters, at least.
 CLUSTERED = 8
@@ -96,31 +88,14 @@ def isotropic(mesh: Mesh, faces: int) -> Mesh:
     return _by_meshlab(mesh, _remeshed, length * np.sqrt(len(first.faces) / faces))
 
 
-SIMPLIFIERS: Mapping[str, Simplifier] = MappingProxyType(
-    {
-        "fast-quadric": fast_quadric,
-        "MeshLab": meshlab_quadric,
-        "MeshLab, own vertices": meshlab_vertices,
-        "VTK": vtk_quadric,
-        "pyacvd": centroidal,
-        "isotropic": isotropic,
-    }
-)
-
-
-def simplified(mesh: Mesh, simplifier: Simplifier, faces: int) -> Mesh | None:
-    """Return the largest part of a simplification; None where it is no fair coarse mesh.
-
-    That is where too much is pinched off, or the simplifier stopped far from the target.
-    """
-    try:
-        whole = simplifier(mesh, faces)
-        part = largest_part(whole)
-    except MeshError:
-        return None
-    near = faces / CLOSENESS <= len(part.faces) <= faces * CLOSENESS
-    kept = len(part.faces) >= LEAST_KEPT * len(whole.faces)
-    return part if near and kept else None
+SIMPLIFIERS: Mapping[str, Simplifier] = {
+    "fast-quadric": fast_quadric,
+    "MeshLab": meshlab_quadric,
+    "MeshLab, own vertices": meshlab_vertices,
+    "VTK": vtk_quadric,
+    "pyacvd": centroidal,
+    "isotropic": isotropic,
+}
 
 
 def _decimated(meshes: Any, faces: float, **options: bool) -> None:

@@ -1,31 +1,22 @@
-"""An endless, seeded stream of random coarse meshes on random surfaces of several families.
+"""Random coarse meshes on random surfaces of several families."""
 
-Whole families are held out: ridges on spheres, tori, rounded boxes and crossings are in no stream.
-"""
-
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import fast_simplification
 import numpy as np
 from jaxtyping import Float
 
 from pns_common import Mesh, clean
-from train.data.datasets import (
-    Dataset,
-    Instance,
-    grid_faces,
-    jittered_grid,
-    saddle_held_out,
-    sphere_ridge_held_out,
-)
-from train.data.patches import JITTER, marched, rounded_boxes, tori
 from train.data.plane_meshes import PlaneMesh, regular_grid, scattered, turned_grid
-from train.surfaces.cad import Fillet
-from train.surfaces.implicit import Ridge, Saddle, Surface
-from train.surfaces.smooth import Bump, Crossing, CurvedRidge, LumpySphere
+from train.surfaces.implicit import Ridge, Saddle
+from train.surfaces.smooth import Bump, CurvedRidge, Fillet, LumpySphere
 
+# From how far, and in how many steps, a patch is moved onto a fillet.
+START, MARCHES = 4.0, 400
+
+Graph = Ridge | CurvedRidge | Bump | Saddle
+Surface = Graph | LumpySphere | Fillet
 Lift = Callable[[Float[np.ndarray, "P 2"]], Float[np.ndarray, "P 3"]]
 
 
@@ -90,9 +81,7 @@ def lumpy_sphere(rng: np.random.Generator) -> Drawn:
         radius,
         amplitude=rng.uniform(0.05, 0.25) * radius,
         frequency=rng.uniform(2, 6),
-        phase_x=rng.uniform(0, 6.3),
-        phase_y=rng.uniform(0, 6.3),
-        phase_z=rng.uniform(0, 6.3),
+        phases=(rng.uniform(0, 6.3), rng.uniform(0, 6.3), rng.uniform(0, 6.3)),
     )
 
     def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
@@ -112,52 +101,33 @@ def fillet(rng: np.random.Generator) -> Drawn:
 
     def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
         turned = plane @ rotation + [0, shift]
-        return marched(surface, turned, np.zeros(3), np.array([0.0, 1.0, 1.0]))
+        sight = np.array([0.0, 1.0, 1.0]) / np.linalg.norm([0.0, 1.0, 1.0])
+        up = np.cross(np.array([1.0, 0.0, 0.0]), sight)
+        up /= np.linalg.norm(up)
+        points = turned[:, :1] * up + turned[:, 1:] * np.cross(sight, up) + START * sight
+        for _ in range(MARCHES):
+            points = points - surface.value(points)[:, None] * sight
+        return points
 
     return Drawn(surface, lift)
 
 
-def crossing(rng: np.random.Generator) -> Drawn:
-    """Draw two crossing ridges: held out of every stream."""
-    angle = rng.uniform(0, np.pi)
-    surface = Crossing(
-        amplitude=rng.uniform(0.3, 0.6),
-        sharpness=rng.uniform(3, 10),
-        angle=angle,
-        other_amplitude=rng.uniform(0.2, 0.5),
-        other_sharpness=rng.uniform(3, 10),
-        other_angle=angle + rng.uniform(0.3, 0.7) * np.pi,
-    )
-    return _graph(surface)
-
-
-Family = Callable[[np.random.Generator], Drawn]
-
-FAMILIES: Mapping[str, Family] = MappingProxyType(
-    {
-        "ridge": ridge,
-        "curved-ridge": curved_ridge,
-        "bump": bump,
-        "saddle": saddle,
-        "lumpy-sphere": lumpy_sphere,
-        "fillet": fillet,
-    }
-)
+FAMILIES = (ridge, curved_ridge, bump, saddle, lumpy_sphere, fillet)
 # How often each family is drawn.
 SHARES = (0.28, 0.12, 0.10, 0.30, 0.12, 0.08)
 
 
-def random_instance(rng: np.random.Generator) -> Instance:
+def random_patch(rng: np.random.Generator) -> tuple[Surface, Mesh]:
     """Draw a family, a surface of it, and a coarse mesh on that."""
-    family = list(FAMILIES.values())[rng.choice(len(FAMILIES), p=SHARES)]
+    family = FAMILIES[rng.choice(len(FAMILIES), p=SHARES)]
     drawn = family(rng)
     kind = rng.choice(4, p=[0.55, 0.15, 0.15, 0.15])
     if kind == 3:
-        return Instance(drawn.surface, decimated(rng, drawn.lift))
+        return drawn.surface, decimated(rng, drawn.lift)
     side = int(rng.integers(8, 12)) if kind else int(rng.choice([9, 9, 9, 8, 10, 11]))
     jitter = rng.uniform(0, 0.5) if kind else rng.choice([0.04, 0.04, 0.3])
     plane = (regular_grid, turned_grid, scattered)[kind](rng, side, jitter)
-    return Instance(drawn.surface, _mesh(plane, drawn.lift))
+    return drawn.surface, _mesh(plane, drawn.lift)
 
 
 def decimated(rng: np.random.Generator, lift: Lift) -> Mesh:
@@ -170,14 +140,7 @@ def decimated(rng: np.random.Generator, lift: Lift) -> Mesh:
     return clean(Mesh(np.asarray(points, dtype=np.float64), faces.astype(np.int64))).mesh
 
 
-def stream(seed: int) -> Iterator[Instance]:
-    """Yield all instances of a seed, without end."""
-    rng = np.random.default_rng(seed)
-    while True:
-        yield random_instance(rng)
-
-
-def _graph(surface: Ridge | CurvedRidge | Crossing | Bump | Saddle) -> Drawn:
+def _graph(surface: Graph) -> Drawn:
     def lift(plane: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 3"]:
         flat = np.concatenate([plane, np.zeros((len(plane), 1))], axis=1)
         return np.concatenate([plane, surface.height(flat)[:, None]], axis=1)
@@ -187,36 +150,3 @@ def _graph(surface: Ridge | CurvedRidge | Crossing | Bump | Saddle) -> Drawn:
 
 def _mesh(plane: PlaneMesh, lift: Lift) -> Mesh:
     return Mesh(lift(plane.points), plane.faces)
-
-
-COUNT = 10
-# No stream starts from it: streams are seeded by recipes, from 0.
-TEST_SEED = 9999
-
-# Families of the paper, which have test sets of their own.
-DRAWN_ELSEWHERE = ("ridge", "saddle")
-
-
-def trained_families() -> list[Dataset]:
-    """Return test sets of the families that are in the stream, but for ridges."""
-    drawn = [
-        family_set(name, family) for name, family in FAMILIES.items() if name not in DRAWN_ELSEWHERE
-    ]
-    return [saddle_held_out(), *drawn]
-
-
-def held_out_families() -> list[Dataset]:
-    """Return test sets of the families that no stream holds."""
-    crossings = family_set("crossing", crossing)
-    return [sphere_ridge_held_out(), crossings, tori(), rounded_boxes()]
-
-
-def family_set(name: str, family: Family) -> Dataset:
-    """Return draws of a family, each on the paper's 9 × 9 patch."""
-    rng = np.random.default_rng(TEST_SEED)
-    instances = []
-    for index in range(COUNT):
-        drawn = family(rng)
-        plane = jittered_grid(TEST_SEED + index, JITTER).double().numpy()
-        instances.append(Instance(drawn.surface, Mesh(drawn.lift(plane), grid_faces())))
-    return Dataset(f"{name}-held-out", tuple(instances))

@@ -12,7 +12,7 @@ import numpy as np
 from pns_common import Mesh, MeshError, clean
 from train.data.dense_meshes import read_mesh
 from train.data.pairs.polygons import REMESHERS
-from train.data.pairs.references import Segments, sharp_edges
+from train.data.sharp_labels import Segments, sharp_edges
 from train.data.simplifiers import SIMPLIFIERS
 
 # Faces of the coarse meshes, and how many meshes each shape gives.

@@ -1,17 +1,7 @@
 """Every experiment, in the order of the page."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
-from train.experiments.beyond import (
-    fairness,
-    fresh_ridges,
-    models,
-    shading,
-    spheres,
-    validation,
-    whole_meshes,
-)
 from train.experiments.harness.experiment import Experiment
 from train.experiments.paper import (
     ablation,
@@ -19,7 +9,6 @@ from train.experiments.paper import (
     c_sweep,
     capacity,
     cross_section,
-    extended,
     headline,
     hero,
     published,
@@ -43,17 +32,7 @@ ORDERED: tuple[Experiment, ...] = (
     saddle.EXPERIMENT,
     sphere_ridge.EXPERIMENT,
     hero.EXPERIMENT,
-    extended.EXPERIMENT,
-    models.EXPERIMENT,
-    validation.EXPERIMENT,
-    whole_meshes.EXPERIMENT,
-    spheres.EXPERIMENT,
-    fresh_ridges.EXPERIMENT,
-    fairness.EXPERIMENT,
-    shading.EXPERIMENT,
     published.EXPERIMENT,
 )
 
-EXPERIMENTS: Mapping[str, Experiment] = MappingProxyType(
-    {experiment.name: experiment for experiment in ORDERED}
-)
+EXPERIMENTS: Mapping[str, Experiment] = {experiment.name: experiment for experiment in ORDERED}

@@ -5,17 +5,16 @@ Whatever the weights, an edge vertex stays in the ball of radius C h² γ round 
 """
 
 import numpy as np
-import torch
 from jaxtyping import Float
-from torch import Tensor
 
-from train.connectivity import Connectivity
+from pns_common import Scheme
+from pns_common.kernels.connectivity import INTERIOR
+from pns_common.operator.formula import Additions
+from pns_common.operator.level import Level
 from train.data.datasets import Dataset, Instance
-from train.loop_masks import loop_mask
 from train.metrics.card import compare_with_loop
 from train.metrics.one_step import Improvement
-from train.reference import Step, Surroundings, edge_frames, on_edges, read_edges
-from train.refining import Method
+from train.refining import additions
 from train.surfaces.implicit import Surface, signed_distance
 
 # What the limit is known for; a normal error has no such bound.
@@ -53,21 +52,23 @@ def best_in_balls(
     return best
 
 
-def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Method:
-    """Return the method that knows the surface and puts each edge vertex where it is best."""
+def oracle(surface: Surface, budget: float, gate_sharpness: float) -> Scheme:
+    """Return the scheme that knows the surface and puts each edge vertex where it is best."""
 
-    def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
-        frames = edge_frames(
-            read_edges(Surroundings(mesh, points), first_face=True), first_face=True
+    def rule(level: Level) -> Additions:
+        assert level.reference_length is not None  # the library measures it for every rule
+        inside = level.topology.edge_class == INTERIOR
+        envelope = budget / level.reference_length * inside * level.edges.lengths**2
+        gate = np.tanh(gate_sharpness * level.edges.jumps**2)
+        placed = level.base.place(level.points, level.topology, level.blocks)
+        none, centres = np.zeros(len(level.points)), placed[len(level.points) :]
+        best = best_in_balls(surface, centres, envelope * gate)
+        moved = np.concatenate([np.zeros_like(level.points), best - centres])
+        return additions(
+            level, moved, np.concatenate([none, envelope]), np.concatenate([none, gate])
         )
-        envelope = torch.zeros_like(frames.length)
-        envelope[mesh.interior] = budget / reference_length * frames.length[mesh.interior] ** 2
-        gate = (envelope > 0) * torch.tanh(gate_sharpness * frames.curvature**2)
-        centres = loop_mask(mesh)(points)[len(points) :]
-        best = best_in_balls(surface, centres.numpy(), (envelope * gate).numpy())
-        return on_edges(points, mesh, torch.from_numpy(best) - centres, envelope, gate)
 
-    return Method("limit", step)
+    return Scheme("limit", rule=rule, learned_levels=None)
 
 
 def envelope_limit(
@@ -75,7 +76,7 @@ def envelope_limit(
 ) -> dict[str, Improvement]:
     """Return the improvement over Loop that no member of the class can pass, in per cent."""
 
-    def best(instance: Instance) -> Method:
+    def best(instance: Instance) -> Scheme:
         return oracle(instance.surface, budget, gate_sharpness)
 
     improvements = compare_with_loop(best, dataset)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pns_common import Mesh
-from train.refining import Refined
+from pns_common import Mesh, Refinement
+from train.refining import LevelFigures, figures
 from train.surfaces.implicit import Surface, signed_distance, unit_normal
-from train.vectors import dot, face_normals, norm, unit
+from train.vectors import dot, face_normals, norm
 
 PROJECTIONS = 4
 FOOT_POINT_STEPS = 40
@@ -42,59 +42,16 @@ class ShapeErrors:
 
 @dataclass(frozen=True, slots=True)
 class LevelErrors:
-    """Errors of a mesh after a number of levels, with what the refinement's report adds.
-
-    Attributes:
-        normal_jump: largest angle between the normals of neighbouring faces.
-        ratio: largest proximity ratio of the last step.
-        flipped: faces of the last step that oppose their Loop counterpart.
-    """
+    """Errors of a mesh after a number of levels, and the figures of the last one."""
 
     level: int
-    faces: int
     shape: ShapeErrors
-    normal_jump: float
-    ratio: float
-    flipped: int
+    figures: LevelFigures
 
 
-@dataclass(frozen=True, slots=True)
-class DistanceLevel:
-    """The mesh that a step has made, without normal errors: cheap on half a million faces."""
-
-    faces: int
-    distance: float
-    hausdorff: float
-    jump: float
-    ratio: float
-    flipped: int
-
-
-def distance_level(surface: Surface, refinement: Refined) -> DistanceLevel:
-    """Measure the distances and the report of a refinement's last step."""
-    distance = np.abs(signed_distance(surface, refinement.mesh.vertices))
-    last = refinement.levels[-1]
-    return DistanceLevel(
-        faces=last.faces,
-        distance=float(np.sqrt((distance**2).mean())),
-        hausdorff=float(distance.max()),
-        jump=last.normal_jump,
-        ratio=last.ratio,
-        flipped=last.flipped,
-    )
-
-
-def level_errors(surface: Surface, refinement: Refined, level: int) -> LevelErrors:
+def level_errors(surface: Surface, refinement: Refinement, level: int) -> LevelErrors:
     """Measure a refinement whose last step was the given level."""
-    last = refinement.levels[-1]
-    return LevelErrors(
-        level=level,
-        faces=last.faces,
-        shape=shape_errors(surface, refinement.mesh),
-        normal_jump=last.normal_jump,
-        ratio=last.ratio,
-        flipped=last.flipped,
-    )
+    return LevelErrors(level, shape_errors(surface, refinement.mesh), figures(refinement)[-1])
 
 
 def shape_errors(surface: Surface, mesh: Mesh) -> ShapeErrors:
@@ -155,41 +112,3 @@ def _projected(surface: Surface, points: Float[np.ndarray, "P 3"]) -> Float[np.n
         if np.abs(step * norm(gradient)).max(initial=0) < CONVERGED:
             break
     return points
-
-
-# Faces with twice their area below this share of their squared sides are left out.
-NO_AREA = 1e-12
-
-
-def bending(mesh: Mesh, normals: Float[np.ndarray, "V 3"] | None = None) -> float:
-    """Return ∫ ‖∇n‖² dA = ∫ (κ₁² + κ₂²) dA of the vertex normals, linear over each face.
-
-    It has no unit: a sphere has 8π at any size. Without `normals` they are the faces' mean by area.
-    """
-    normals = vertex_normals(mesh) if normals is None else normals
-    corners, corner_normals = mesh.vertices[mesh.faces], normals[mesh.faces]
-    sides = np.roll(corners, -1, axis=1) - corners
-    twice = norm(np.cross(sides[:, 0], -sides[:, 2]))
-    square = (sides**2).sum(axis=2)
-    defined = twice > NO_AREA * square.sum(axis=1)
-    total = 0.0
-    for side in range(3):
-        opposite = -(sides[:, (side + 1) % 3] * sides[:, (side + 2) % 3]).sum(axis=1)
-        change = ((corner_normals[:, (side + 1) % 3] - corner_normals[:, side]) ** 2).sum(axis=1)
-        total += float((opposite / np.where(defined, twice, np.inf) * change).sum()) / 2
-    return total
-
-
-def vertex_normals(mesh: Mesh) -> Float[np.ndarray, "V 3"]:
-    """Return unit normals, the faces' mean by area; zero where there is none."""
-    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    area, corners = np.repeat(np.cross(b - a, c - a), 3, axis=0), mesh.faces.reshape(-1)
-    count = len(mesh.vertices)
-    return unit(np.stack([np.bincount(corners, component, count) for component in area.T], axis=1))
-
-
-def volume(mesh: Mesh) -> float:
-    """Return the signed volume of a closed mesh, seen from its centroid."""
-    centred = mesh.vertices - mesh.vertices.mean(axis=0)
-    a, b, c = (centred[mesh.faces[:, corner]] for corner in range(3))
-    return float(dot(a, np.cross(b, c)).sum()) / 6

@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
-from pns_common import Mesh, loop
-from train.connectivity import connect
-from train.data.datasets import Dataset, Instance
-from train.metrics.shape import face_normal_error, nearest_points
-from train.reference import Surroundings
-from train.refining import AnyScheme, largest_turn, refine
+from pns_common import Mesh, Scheme
+from pns_common.operator.level import Level
+from pns_common.parallel import Blocks
+from pns_common.schemes.loop import LOOP
+from train.data.datasets import Dataset
+from train.metrics.shape import face_normal_error
+from train.refining import figures, refine
 from train.surfaces.implicit import signed_distance
 
 PAPER_UNITS = 1.0
@@ -23,31 +23,16 @@ class WholeSurface:
 
     Attributes:
         distance: root mean square of |f| / ‖∇f‖ over all vertices.
-        largest: the largest |f| / ‖∇f‖ of a vertex.
         normal: mean angle between a face's normal and the surface's, radians.
         jump: largest angle between neighbouring faces, radians.
-        ratio: largest proximity ratio of all levels; 0 for Loop.
-        flipped: flipped faces of all levels.
     """
 
     distance: Float[np.ndarray, " N"]
-    largest: Float[np.ndarray, " N"]
     normal: Float[np.ndarray, " N"]
     jump: Float[np.ndarray, " N"]
-    ratio: Float[np.ndarray, " N"]
-    flipped: Float[np.ndarray, " N"]
 
 
-@dataclass(frozen=True, slots=True)
-class Gain:
-    """A scheme against Loop, in per cent of the mean error; `worst` is the worst instance's."""
-
-    distance: float
-    worst: float
-    normal: float
-
-
-def whole_surface(scheme: AnyScheme, dataset: Dataset, levels: int) -> WholeSurface:
+def whole_surface(scheme: Scheme, dataset: Dataset, levels: int) -> WholeSurface:
     """Refine every instance in the paper's units and measure it whole."""
     rows = []
     for instance in dataset.instances:
@@ -56,30 +41,11 @@ def whole_surface(scheme: AnyScheme, dataset: Dataset, levels: int) -> WholeSurf
         rows.append(
             (
                 np.sqrt((distance**2).mean()),
-                np.abs(distance).max(),
                 face_normal_error(instance.surface, refined.mesh).mean(),
-                refined.levels[-1].normal_jump,
-                max(level.ratio for level in refined.levels),
-                sum(level.flipped for level in refined.levels),
+                figures(refined)[-1].normal_jump,
             )
         )
     return WholeSurface(*np.array(rows, dtype=float).T)
-
-
-def gain(surface: WholeSurface, reference: WholeSurface) -> Gain:
-    """Compare paired errors; negative is worse."""
-    return Gain(
-        distance=_percent(surface.distance.mean(), reference.distance.mean()),
-        worst=float(100 * (1 - (surface.distance / reference.distance).max())),
-        normal=_percent(surface.normal.mean(), reference.normal.mean()),
-    )
-
-
-def surface_jump(instance: Instance, levels: int) -> float:
-    """Return the largest jump of Loop's refined mesh once its vertices lie on the surface."""
-    refined = refine(instance.mesh, loop(), levels, PAPER_UNITS).mesh
-    laid = Mesh(nearest_points(instance.surface, refined.vertices), refined.faces)
-    return normal_jump(laid)
 
 
 def normal_jump(mesh: Mesh) -> float:
@@ -87,9 +53,5 @@ def normal_jump(mesh: Mesh) -> float:
 
     Faces without area have no normal, and turn from none.
     """
-    level = connect(mesh.faces, len(mesh.vertices))
-    return largest_turn(Surroundings(level, torch.tensor(mesh.vertices)))
-
-
-def _percent(value: float, reference: float) -> float:
-    return float(100 * (1 - value / reference))
+    jumps = Level(mesh.vertices, mesh.topology(), LOOP, None, Blocks()).edges.jumps
+    return float(2 * np.arcsin(min(1.0, np.sqrt(jumps.max(initial=0) / 2))))

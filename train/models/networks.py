@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from types import MappingProxyType
 from typing import cast
 
 import numpy as np
@@ -16,13 +15,14 @@ from pns_common.model.features import Symmetries
 # The coordinates of a, b, c, d: what the unconstrained network sees instead of features.
 RAW_COORDINATES = "raw-12"
 
-INPUT_COUNT: Mapping[str, int] = MappingProxyType({**EDGE_FEATURES, RAW_COORDINATES: 12})
+INPUT_COUNT: Mapping[str, int] = {**EDGE_FEATURES, RAW_COORDINATES: 12}
 
-
-ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = MappingProxyType(
-    # nn.GELU is the exact one, x Φ(x) with erf, unless told otherwise.
-    {"gelu": nn.GELU, "silu": nn.SiLU, "tanh": nn.Tanh}
-)
+# nn.GELU is the exact one, x Φ(x) with erf, unless told otherwise.
+ACTIVATIONS: Mapping[str, Callable[[], nn.Module]] = {
+    "gelu": nn.GELU,
+    "silu": nn.SiLU,
+    "tanh": nn.Tanh,
+}
 
 
 class BoundedNet(nn.Module):

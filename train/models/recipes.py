@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import msgspec
 
@@ -145,12 +144,10 @@ def general_quad(seed: int = 0) -> Recipe:
     return replace(base, name="general-quad", directed=over, training=plan)
 
 
-RECIPES: Mapping[str, Callable[[int], Recipe]] = MappingProxyType(
-    {
-        "paper": paper,
-        "paper-text": paper_text,
-        "signed": signed,
-        "general": general,
-        "general-quad": general_quad,
-    }
-)
+RECIPES: Mapping[str, Callable[[int], Recipe]] = {
+    "paper": paper,
+    "paper-text": paper_text,
+    "signed": signed,
+    "general": general,
+    "general-quad": general_quad,
+}

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from torch import Tensor
 
-from pns_common import Mesh, ParameterError
-from train.refining import AnyScheme, refine
+from pns_common import Mesh, ParameterError, Scheme
+from train.refining import refine
 from train.spectra import stars
 from train.spectra.stars import BuildStar, Star, Subspace, keeps_blocks, symmetry_blocks
 
@@ -78,7 +78,7 @@ def reif_gap(size: Float[np.ndarray, " M"]) -> float:
 
 
 def closed_star(
-    scheme: AnyScheme, valence: int, shake: float = 1 / 20, build_star: BuildStar = stars.star
+    scheme: Scheme, valence: int, shake: float = 1 / 20, build_star: BuildStar = stars.star
 ) -> Callable[[float], Star]:
     """Return the stars, by lift, on which a scheme maps the inner rings to themselves.
 
@@ -141,7 +141,7 @@ def refined_inner(
     return refined[rows].reshape(copies, -1)
 
 
-def jacobian(scheme: AnyScheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
+def jacobian(scheme: Scheme, star: Star, step: float = STEP) -> Float[np.ndarray, "M M"]:
     """Differentiate one step of a scheme, inner rings to inner rings in all coordinates.
 
     By central differences on the scheme itself, in double precision: any scheme will do, and
@@ -252,7 +252,7 @@ def continued_spectrum(matrix: Float[np.ndarray, "L L"], before: Spectrum) -> Sp
     return replace(spectrum, tangent=_marked(np.concatenate(tangents), len(spectrum.values)))
 
 
-def follow_lift(scheme: AnyScheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
+def follow_lift(scheme: Scheme, valence: int, lifts: Sequence[float]) -> list[Spectrum]:
     """Follow the spectrum of a star while its centre is lifted; the first lift is 0.
 
     Between two lifts they are followed in smaller strides.

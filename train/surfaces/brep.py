@@ -1,4 +1,4 @@
-"""Exact solids of OpenCascade, and their surfaces as triangles that know which edges are sharp.
+"""Exact solids of OpenCascade, and their surfaces as triangles with exact normals.
 
 OpenCascade (LGPL-2.1, Python wheel `cadquery-ocp-novtk`) makes training data alone. A shape is
 built by booleans, fillets and chamfers from prisms, cylinders and turned profiles.
@@ -51,13 +51,11 @@ class Tessellation:
 
     Attributes:
         normals: of each corner, exact: those of the surface that its triangle belongs to.
-        patch: the face of the solid that each triangle lies in.
     """
 
     vertices: Float[np.ndarray, "V 3"]
     faces: Int[np.ndarray, "F 3"]
     normals: Float[np.ndarray, "F 3 3"]
-    patch: Int[np.ndarray, " F"]
 
 
 def prism(outline: Float[np.ndarray, "N 2"], low: float, high: float) -> Solid:
@@ -156,8 +154,8 @@ def tessellated(shape: Solid, deflection: float, angle: float) -> Tessellation:
     """Return triangles whose chords are within a deflection, and turn by at most an angle."""
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, angle, False)
-    points, normals, faces, patch, count = [], [], [], [], 0
-    for number, part in enumerate(_explored(shape, TopAbs_ShapeEnum.TopAbs_FACE)):
+    points, normals, faces, count = [], [], [], 0
+    for part in _explored(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         face = TopoDS.Face(part)
         place = TopLoc_Location()
         triangles = BRep_Tool.Triangulation_s(face, place)
@@ -174,16 +172,14 @@ def tessellated(shape: Solid, deflection: float, angle: float) -> Tessellation:
             [triangles.Triangle(k).Get() for k in range(1, triangles.NbTriangles() + 1)]
         )
         faces.append((corners[:, ::-1] if turned_over else corners) - 1 + count)
-        patch.append(np.full(len(corners), number))
         count += len(nodes)
-    return _welded(*(np.concatenate(rows) for rows in (points, normals, faces, patch)))
+    return _welded(*(np.concatenate(rows) for rows in (points, normals, faces)))
 
 
 def _welded(
     points: Float[np.ndarray, "N 3"],
     normals: Float[np.ndarray, "N 3"],
     faces: Int[np.ndarray, "F 3"],
-    patch: Int[np.ndarray, " F"],
 ) -> Tessellation:
     size = float(np.ptp(points, axis=0).max())
     _, first, number = np.unique(
@@ -191,7 +187,7 @@ def _welded(
     )
     welded = number.reshape(-1)[faces]
     kept = (welded != np.roll(welded, 1, axis=1)).all(axis=1)
-    return Tessellation(points[first], welded[kept], normals[faces[kept]], patch[kept])
+    return Tessellation(points[first], welded[kept], normals[faces[kept]])
 
 
 def _explored(shape: Solid, kind: TopAbs_ShapeEnum) -> Iterator[Solid]:

@@ -15,13 +15,8 @@ Points = Float[Any, "P 3"]
 Scalars = Float[Any, " P"]
 
 
-class Surface(Protocol):
-    """The zero set of `value`; positive outside (above), where `gradient` points.
-
-    A dataclass, whose fields are its parameters.
-    """
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
+class Implicit(Protocol):
+    """The zero set of `value`; positive outside (above), where `gradient` points."""
 
     def value(self, points: Points) -> Scalars:
         """Return f at each point."""
@@ -30,6 +25,12 @@ class Surface(Protocol):
     def gradient(self, points: Points) -> Points:
         """Return ∇f at each point."""
         ...
+
+
+class Surface(Implicit, Protocol):
+    """A surface of the paper's families: a dataclass, whose fields are its parameters."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def feature_distance(self, points: Points) -> Scalars:
         """Return how far each point is from the surface's feature, ≥ 0; small means near it."""
@@ -151,13 +152,13 @@ class SphereRidge:
         return direction - slope[:, None] * tangent
 
 
-def signed_distance(surface: Surface, points: Points) -> Scalars:
+def signed_distance(surface: Implicit, points: Points) -> Scalars:
     """Return f / ‖∇f‖: the distance to first order, which the published metrics use."""
     xp = array_namespace(points)
     return surface.value(points) / xp.linalg.vector_norm(surface.gradient(points), axis=-1)
 
 
-def unit_normal(surface: Surface, points: Points) -> Points:
+def unit_normal(surface: Implicit, points: Points) -> Points:
     """Return ∇f / ‖∇f‖ at each point."""
     xp = array_namespace(points)
     gradient = surface.gradient(points)

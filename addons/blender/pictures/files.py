@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -10,18 +11,18 @@ import numpy as np
 from pns_common import Mesh, clean
 
 READERS = {
-    ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path),
-    ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path),
-    ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path),
-    ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
-    ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".obj": bpy.ops.wm.obj_import,
+    ".ply": bpy.ops.wm.ply_import,
+    ".stl": bpy.ops.wm.stl_import,
+    ".glb": bpy.ops.import_scene.gltf,
+    ".gltf": bpy.ops.import_scene.gltf,
 }
 # Blender's own meshes, by these words in place of a path.
 MADE = {
-    "suzanne": lambda path: bpy.ops.mesh.primitive_monkey_add(rotation=(0, 0, 0)),
-    "cube": lambda path: bpy.ops.mesh.primitive_cube_add(),
-    "cylinder": lambda path: bpy.ops.mesh.primitive_cylinder_add(vertices=16),
-    "cone": lambda path: bpy.ops.mesh.primitive_cone_add(vertices=16),
+    "suzanne": bpy.ops.mesh.primitive_monkey_add,
+    "cube": bpy.ops.mesh.primitive_cube_add,
+    "cylinder": partial(bpy.ops.mesh.primitive_cylinder_add, vertices=16),
+    "cone": partial(bpy.ops.mesh.primitive_cone_add, vertices=16),
 }
 
 
@@ -34,11 +35,13 @@ def read(path: Path) -> Mesh:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             return welded(arrays["vertices"], arrays["faces"])
-    reader = MADE.get(str(path)) or READERS.get(path.suffix.lower())
-    if reader is None:
-        raise SystemExit(f"{path}: not one of {', '.join([*READERS, '.npz'])}")
     before = set(bpy.data.objects)
-    reader(str(path))
+    if str(path) in MADE:
+        MADE[str(path)]()
+    elif path.suffix.lower() in READERS:
+        READERS[path.suffix.lower()](filepath=str(path))
+    else:
+        raise SystemExit(f"{path}: not one of {', '.join([*READERS, '.npz'])}")
     objects = [o for o in bpy.data.objects if o not in before and o.type == "MESH"]
     if not objects:
         raise SystemExit(f"{path}: no mesh in it")

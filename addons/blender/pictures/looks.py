@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import bpy
 
+Colour = tuple[float, float, float, float]
 CLAY = (0.42, 0.245, 0.165, 1)
 DARK, LIGHT = (0.012, 0.014, 0.02, 1), (0.72, 0.74, 0.78, 1)
 STRIPES = 9.0
@@ -35,24 +36,16 @@ def clay() -> bpy.types.Material:
 
 def zebra() -> bpy.types.Material:
     """Make stripes of light as a polished surface reflects them: they kink where normals do."""
-    material, tree, out = _empty("zebra")
+    material, tree, glow = _glowing("zebra")
     where = tree.nodes.new("ShaderNodeTexCoord")
     axes = tree.nodes.new("ShaderNodeSeparateXYZ")
     wave = _maths(tree, "SINE", _maths(tree, "MULTIPLY", axes.outputs["Z"], STRIPES))
     # A steep ramp between the stripes instead of a step: no jagged edges.
     edge = tree.nodes.new("ShaderNodeMapRange")
     edge.inputs["From Min"].default_value, edge.inputs["From Max"].default_value = -0.12, 0.12
-    mix = tree.nodes.new("ShaderNodeMix")
-    mix.data_type = "RGBA"
-    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    colours[0].default_value, colours[1].default_value = DARK, LIGHT
-    glow = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(where.outputs["Reflection"], axes.inputs["Vector"])
     tree.links.new(wave, edge.inputs["Value"])
-    tree.links.new(edge.outputs["Result"], mix.inputs["Factor"])
-    result = next(socket for socket in mix.outputs if socket.type == "RGBA")
-    tree.links.new(result, glow.inputs["Color"])
-    tree.links.new(glow.outputs["Emission"], out.inputs["Surface"])
+    tree.links.new(_mixed(tree, edge.outputs["Result"], DARK, LIGHT), glow.inputs["Color"])
     return material
 
 
@@ -63,16 +56,9 @@ def wire() -> bpy.types.Material:
     lines = tree.nodes.new("ShaderNodeWireframe")
     lines.use_pixel_size = True
     lines.inputs["Size"].default_value = WIRE
-    mix = tree.nodes.new("ShaderNodeMix")
-    mix.data_type = "RGBA"
-    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    colours[0].default_value, colours[1].default_value = (
-        (0.75, 0.72, 0.68, 1),
-        (0.05, 0.05, 0.06, 1),
-    )
-    tree.links.new(lines.outputs["Fac"], mix.inputs["Factor"])
-    result = next(socket for socket in mix.outputs if socket.type == "RGBA")
-    tree.links.new(result, shader.inputs["Base Color"])
+    colours = (0.75, 0.72, 0.68, 1), (0.05, 0.05, 0.06, 1)
+    mixed = _mixed(tree, lines.outputs["Fac"], *colours)
+    tree.links.new(mixed, shader.inputs["Base Color"])
     shader.inputs["Roughness"].default_value = 0.6
     return material
 
@@ -95,23 +81,20 @@ def heat(field: str, highest: float) -> bpy.types.Material:
 
 def bar() -> bpy.types.Material:
     """Make the ramp itself along a plane's first texture coordinate, for a legend."""
-    material, tree, out = _empty("bar")
+    material, tree, glow = _glowing("bar")
     where = tree.nodes.new("ShaderNodeTexCoord")
     axes = tree.nodes.new("ShaderNodeSeparateXYZ")
-    ramp, glow = colour_ramp(tree), tree.nodes.new("ShaderNodeEmission")
+    ramp = colour_ramp(tree)
     tree.links.new(where.outputs["Generated"], axes.inputs["Vector"])
     tree.links.new(axes.outputs["X"], ramp.inputs["Fac"])
     tree.links.new(ramp.outputs["Color"], glow.inputs["Color"])
-    tree.links.new(glow.outputs["Emission"], out.inputs["Surface"])
     return material
 
 
 def ink() -> bpy.types.Material:
     """Make what letters are drawn with: no light falls on them."""
-    material, tree, out = _empty("ink")
-    glow = tree.nodes.new("ShaderNodeEmission")
+    material, _, glow = _glowing("ink")
     glow.inputs["Color"].default_value = (0.01, 0.01, 0.012, 1)
-    tree.links.new(glow.outputs["Emission"], out.inputs["Surface"])
     return material
 
 
@@ -138,12 +121,26 @@ def _principled(name: str) -> tuple[bpy.types.Material, bpy.types.Node]:
     return material, next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
 
 
-def _empty(name: str) -> tuple[bpy.types.Material, bpy.types.NodeTree, bpy.types.Node]:
+def _glowing(name: str) -> tuple[bpy.types.Material, bpy.types.NodeTree, bpy.types.Node]:
+    """Return a material that gives light of its own, its nodes, and that which makes the light."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    return material, tree, tree.nodes.new("ShaderNodeOutputMaterial")
+    out, glow = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(glow.outputs["Emission"], out.inputs["Surface"])
+    return material, tree, glow
+
+
+def _mixed(
+    tree: bpy.types.NodeTree, share: bpy.types.NodeSocket, first: Colour, second: Colour
+) -> bpy.types.NodeSocket:
+    mix = tree.nodes.new("ShaderNodeMix")
+    mix.data_type = "RGBA"
+    low, high = (socket for socket in mix.inputs if socket.type == "RGBA")
+    low.default_value, high.default_value = first, second
+    tree.links.new(share, mix.inputs["Factor"])
+    return next(socket for socket in mix.outputs if socket.type == "RGBA")
 
 
 def _maths(

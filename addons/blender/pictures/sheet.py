@@ -29,21 +29,10 @@ class Row:
     shapes: Sequence[Shape]
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The sheet's size in cells' widths, and the cells' height."""
-
-    width: float
-    height: float
-
-
-def build(rows: Sequence[Row], turns: Sequence[float] = (0.0,)) -> Layout:
-    """Put everything on stage, in cells that hold it at each of these turns (degrees).
-
-    The objects hang on pivots named "pivot", which stand at the first turn.
-    """
+def build(rows: Sequence[Row], turn: float) -> tuple[float, float]:
+    """Put everything on stage, turned (degrees); the sheet's size in cells' widths."""
     columns = max(len(row.shapes) for row in rows)
-    extents = [extent(row.shapes, turns) for row in rows]
+    extents = [extent(row.shapes, turn) for row in rows]
     heights = [min(1.0, high / wide) if wide > 0 else 1.0 for wide, high in extents]
     total = sum(heights) + TEXT
     left, top = -columns / 2, total / 2
@@ -52,16 +41,16 @@ def build(rows: Sequence[Row], turns: Sequence[float] = (0.0,)) -> Layout:
     top -= TEXT
     for number, (row, (wide, _), height) in enumerate(zip(rows, extents, heights, strict=True)):
         scale = (1 - 2 * MARGIN) / wide
-        _build_row(row, (left, top - height / 2, NEARER * number), scale, turns)
+        _build_row(row, (left, top - height / 2, NEARER * number), scale, turn)
         top -= height
     camera(columns, total)
     light()
-    return Layout(columns, total)
+    return columns, total
 
 
-def extent(shapes: Sequence[Shape], turns: Sequence[float]) -> tuple[float, float]:
+def extent(shapes: Sequence[Shape], turn: float) -> tuple[float, float]:
     """Return how wide and high the widest and highest are in the picture, with its margin."""
-    sizes = [_box(shape, turns) for shape in shapes]
+    sizes = [_box(shape, turn) for shape in shapes]
     wide = max(high[0] - low[0] for low, high in sizes)
     tall = max(high[1] - low[1] for low, high in sizes)
     return max(wide, tall * 0.9), tall / (1 - 2 * MARGIN)
@@ -91,9 +80,7 @@ def legend(title: str, highest: float, across: float, along: float) -> None:
     text(f"{highest:.3g}", across + 0.3, along - 0.08, 0.05)
 
 
-def _build_row(
-    row: Row, where: tuple[float, float, float], scale: float, turns: Sequence[float]
-) -> None:
+def _build_row(row: Row, where: tuple[float, float, float], scale: float, turn: float) -> None:
     left, middle, depth = where
     if row.look in LOOKS:
         material = LOOKS[row.look]()
@@ -106,22 +93,19 @@ def _build_row(
         legend(FIELDS[row.look], highest, left + free + 0.5, middle)
     for column, (shape, show) in enumerate(zip(row.shapes, shown, strict=True)):
         if show:
-            place(shape, material, at(left + column + 0.5, middle, depth), scale, turns)
+            place(shape, material, at(left + column + 0.5, middle, depth), scale, turn)
 
 
 def place(
-    shape: Shape, material: bpy.types.Material, where: Vector, scale: float, turns: Sequence[float]
+    shape: Shape, material: bpy.types.Material, where: Vector, scale: float, turn: float
 ) -> None:
-    """Put the middle of a shape's picture there; the pivot stands where its turning axis is."""
-    low, high = _box(shape, turns)
+    """Put the middle of a shape's picture there."""
+    low, high = _box(shape, turn)
     middle = (low + high) / 2
-    pivot = bpy.data.objects.new("pivot", None)
     shift = RIGHT * middle[0] + UP * middle[1] + VIEW * middle[2]
-    pivot.matrix_world = Matrix.Translation(where - shift * scale) @ Matrix.Scale(scale, 4)
-    pivot.rotation_euler.z = math.radians(turns[0])
-    bpy.context.scene.collection.objects.link(pivot)
     obj = bpy.data.objects.new(shape.title, _mesh(shape, material))
-    obj.parent = pivot
+    obj.matrix_world = Matrix.Translation(where - shift * scale) @ Matrix.Scale(scale, 4)
+    obj.rotation_euler.z = math.radians(turn)
     bpy.context.scene.collection.objects.link(obj)
 
 
@@ -162,12 +146,9 @@ def centred(shape: Shape) -> np.ndarray:
     return points - (points.min(axis=0) + points.max(axis=0)) / 2
 
 
-def _box(shape: Shape, turns: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a shape begins and ends along the picture's axes, over all these turns."""
-    points, axes = centred(shape), np.array([RIGHT, UP, VIEW]).T
-    boxes = []
-    for angle in map(math.radians, turns):
-        c, s = math.cos(angle), math.sin(angle)
-        seen = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ axes
-        boxes.append((seen.min(axis=0), seen.max(axis=0)))
-    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+def _box(shape: Shape, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a turned shape begins and ends along the picture's axes."""
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    turned = centred(shape) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    seen = turned @ np.array([RIGHT, UP, VIEW]).T
+    return seen.min(axis=0), seen.max(axis=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -15,14 +14,6 @@ VIEW = Vector((0.8, -1.0, 0.45)).normalized()
 RIGHT = Vector((0, 0, 1)).cross(VIEW).normalized()
 UP = VIEW.cross(RIGHT)
 SUN, SKY = 1.7, 0.36
-
-
-@dataclass(frozen=True)
-class Quality:
-    """Renderer of a picture: ``CYCLES`` or Eevee's name, and the samples of a pixel."""
-
-    engine: str = "CYCLES"
-    samples: int = 32
 
 
 def clear() -> None:
@@ -76,57 +67,22 @@ def light() -> None:
     bpy.context.scene.world = world
 
 
-def prepare(width: int, height: int, quality: Quality) -> None:
-    """Set what every picture has: as many pixels, the same seed, colours as they are."""
+def picture(output: Path, width: int, height: int, samples: int) -> None:
+    """Render a picture of so many pixels, always with the same seed and colours as they are.
+
+    It has a temporary name first, so that nobody sees half of it.
+    """
+    bpy.ops.preferences.addon_enable(module="cycles")
     scene = bpy.context.scene
-    if quality.engine == "CYCLES":
-        bpy.ops.preferences.addon_enable(module="cycles")
-        scene.render.engine = "CYCLES"
-        scene.cycles.device = "CPU"
-        scene.cycles.samples, scene.cycles.seed = quality.samples, 0
-        scene.cycles.use_denoising = True
-    else:
-        # Eevee was called otherwise for some versions.
-        names = [item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items]
-        scene.render.engine = next(name for name in names if "EEVEE" in name)
-        scene.eevee.taa_render_samples = quality.samples
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.seed, scene.cycles.use_denoising = samples, 0, True
     scene.render.resolution_x, scene.render.resolution_y = width, height
-    scene.render.resolution_percentage = 100
+    scene.render.resolution_percentage, scene.render.use_stamp = 100, False
     scene.view_settings.view_transform = "Standard"
-    scene.render.use_stamp = False
-
-
-def picture(output: Path) -> None:
-    """Render one picture; under a temporary name first, so that nobody sees half of it."""
-    scene = bpy.context.scene
-    scene.render.image_settings.file_format = "PNG"
-    scene.render.image_settings.color_mode = "RGB"
-    scene.render.image_settings.compression = 100
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.compression = "PNG", "RGB", 100
     temporary = output.with_name(f"{output.stem}.tmp.png").resolve()
     scene.render.filepath = str(temporary)
     bpy.ops.render.render(write_still=True)
     temporary.replace(output)
-
-
-def film(output: Path, frames: int) -> None:
-    """Render frames 1 to ``frames`` as a film, by the encoder that Blender comes with.
-
-    Raises:
-        SystemExit: this Blender has none.
-    """
-    if not bpy.app.build_options.codec_ffmpeg:
-        raise SystemExit("this Blender has no encoder for films: render pictures instead")
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end, scene.render.fps = 1, frames, 24
-    settings = scene.render.image_settings
-    # Since 5.0 the kind is chosen before the format.
-    if hasattr(settings, "media_type"):
-        settings.media_type = "VIDEO"
-    settings.file_format = "FFMPEG"
-    coding = scene.render.ffmpeg
-    coding.format, coding.codec, coding.constant_rate_factor = "MPEG4", "H264", "HIGH"
-    temporary = output.with_name(f"{output.stem}.tmp.mp4").resolve()
-    scene.render.use_file_extension = False
-    scene.render.filepath = str(temporary)
-    bpy.ops.render.render(animation=True)
-    temporary.replace(output)
+    print(f"{output}: {width} × {height}")

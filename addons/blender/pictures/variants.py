@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pns_common import Mesh, Refinement, load_model, loop, pns, refine
-from pns_common.mesh.topology import build_topology
+from pns_common.carry.carried import Column, refine_column
 from pns_common.parallel import Blocks
 from pns_common.schemes.limit import limit_normals, limit_positions
 from pns_common.schemes.loop import LOOP
@@ -43,7 +43,8 @@ def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
 
 def loop_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     """Refine by Loop's rules."""
-    return _smooth("Loop", refine(mesh, loop(), levels), {})
+    made = refine(mesh, loop(), levels).mesh
+    return Shape("Loop", made.vertices, made.faces, True, {})
 
 
 def subsurf_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
@@ -83,24 +84,11 @@ def learned_surface(mesh: Mesh, levels: int, model: str | None) -> Shape:
     scheme = pns(load_model(model))
     made = refine(mesh, scheme, levels)
     learned = min(levels, scheme.learned_levels or levels)
-    to_learned = made if learned == levels else refine(mesh, scheme, learned)
-    # Later levels are Loop's: a ratio stays with the vertices that it was measured at.
-    ratio = spread(to_learned.ratio, to_learned, levels - learned)
+    added = made.steps[learned - 1].added
+    assert added is not None
+    # Later levels are Loop's: new vertices have the mean of the edge's ends.
+    ratio = refine_column(Column(added.ratio), made.topologies[learned:], LOOP)
     return _beside_loop("PNS", made, mesh, levels, {"ratio": ratio})
-
-
-def spread(
-    values: Float[np.ndarray, " V"], made: Refinement, levels: int
-) -> Float[np.ndarray, " W"]:
-    """Spread values at vertices: those of later levels have the mean of the edge's ends."""
-    faces, count = made.mesh.faces, len(made.mesh.vertices)
-    mesh = made.mesh
-    for _ in range(levels):
-        topology = build_topology(faces, count)
-        values = np.concatenate([values, values[topology.edges].mean(axis=1)])
-        mesh = refine(mesh, loop(), 1).mesh
-        faces, count = mesh.faces, len(mesh.vertices)
-    return values
 
 
 VARIANTS: dict[str, Callable[[Mesh, int, str | None], Shape]] = {
@@ -112,15 +100,11 @@ VARIANTS: dict[str, Callable[[Mesh, int, str | None], Shape]] = {
 }
 
 
-def _smooth(title: str, made: Refinement, fields: dict[str, np.ndarray]) -> Shape:
-    last = made.scheme.base.split(made.topologies[-1], Blocks())
-    sharp = last.edges[last.is_sharp].astype(np.int64)
-    return Shape(title, made.mesh.vertices, made.mesh.faces, True, fields, sharp)
-
-
 def _beside_loop(
     title: str, made: Refinement, mesh: Mesh, levels: int, fields: dict[str, np.ndarray]
 ) -> Shape:
-    plain = refine(mesh, loop(), levels)
-    distance = np.linalg.norm(made.mesh.vertices - plain.mesh.vertices, axis=1)
-    return _smooth(title, made, {"distance": distance, **fields})
+    plain, points = refine(mesh, loop(), levels), made.mesh.vertices
+    distance = np.linalg.norm(points - plain.mesh.vertices, axis=1)
+    last = made.scheme.base.split(made.topologies[-1], Blocks())
+    sharp = last.edges[last.is_sharp].astype(np.int64)
+    return Shape(title, points, made.mesh.faces, True, {"distance": distance, **fields}, sharp)

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .refining.snapshot import Domain, Layer, Rule
+from pns_common.carry import rules
+from pns_common.carry.rules import Rule
+
+from .refining.snapshot import Layer
 
 
 @dataclass(frozen=True)
@@ -23,19 +26,19 @@ class Kind:
 
 
 KINDS = {
-    "FLOAT": Kind("value", 1, np.float32, Rule.BLEND),
-    "FLOAT2": Kind("vector", 2, np.float32, Rule.BLEND),
-    "FLOAT_VECTOR": Kind("vector", 3, np.float32, Rule.BLEND),
-    "FLOAT_COLOR": Kind("color", 4, np.float32, Rule.BLEND),
-    "BYTE_COLOR": Kind("color", 4, np.float32, Rule.BLEND),
-    "QUATERNION": Kind("value", 4, np.float32, Rule.BLEND, unit=True),
-    "FLOAT4X4": Kind("value", 16, np.float32, Rule.BLEND),
-    "INT": Kind("value", 1, np.int32, Rule.VOTE),
-    "INT8": Kind("value", 1, np.int32, Rule.VOTE),
-    "INT16_2D": Kind("value", 2, np.int32, Rule.VOTE),
-    "INT32_2D": Kind("value", 2, np.int32, Rule.VOTE),
-    "BOOLEAN": Kind("value", 1, np.bool_, Rule.VOTE),
-    "STRING": Kind("value", 1, np.int64, Rule.VOTE),
+    "FLOAT": Kind("value", 1, np.float32, rules.smooth),
+    "FLOAT2": Kind("vector", 2, np.float32, rules.smooth),
+    "FLOAT_VECTOR": Kind("vector", 3, np.float32, rules.smooth),
+    "FLOAT_COLOR": Kind("color", 4, np.float32, rules.smooth),
+    "BYTE_COLOR": Kind("color", 4, np.float32, rules.smooth),
+    "QUATERNION": Kind("value", 4, np.float32, rules.smooth, unit=True),
+    "FLOAT4X4": Kind("value", 16, np.float32, rules.smooth),
+    "INT": Kind("value", 1, np.int32, rules.vote),
+    "INT8": Kind("value", 1, np.int32, rules.vote),
+    "INT16_2D": Kind("value", 2, np.int32, rules.vote),
+    "INT32_2D": Kind("value", 2, np.int32, rules.vote),
+    "BOOLEAN": Kind("value", 1, np.bool_, rules.vote),
+    "STRING": Kind("value", 1, np.int64, rules.vote),
 }
 # What the mesh is made of, and what is read and written in other ways.
 STRUCTURE = {
@@ -62,7 +65,7 @@ def read_layers(mesh: bpy.types.Mesh) -> Iterator[Layer | None]:
     names = [a.name for a in mesh.attributes if is_carried(a.name) and a.data_type in KINDS]
     for name in names:
         attribute = mesh.attributes[name]
-        kind, domain = KINDS[attribute.data_type], Domain(attribute.domain)
+        kind, domain = KINDS[attribute.data_type], attribute.domain
         texts: tuple[str | bytes, ...] = ()
         if attribute.data_type == "STRING":
             strings = []
@@ -73,13 +76,20 @@ def read_layers(mesh: bpy.types.Mesh) -> Iterator[Layer | None]:
         else:
             values = np.zeros(len(attribute.data) * kind.width, kind.dtype)
             attribute.data.foreach_get(kind.field, values)
-        rule = Rule.KEEP if domain in (Domain.EDGE, Domain.FACE) else kind.rule
-        if name in OF_ONE_VERTEX:
-            rule = Rule.KEEP
+        one = domain in ("EDGE", "FACE") or name in OF_ONE_VERTEX
+        rule = rules.old if one else kind.rule
         values = values.reshape(-1, kind.width)
-        if rule is Rule.BLEND:
+        if rule is rules.smooth:
             values = values.astype(np.float64)
-        yield Layer(name, attribute.data_type, domain, rule, values, texts, kind.unit)
+        yield Layer(
+            values,
+            rule,
+            unit=kind.unit,
+            name=name,
+            kind=attribute.data_type,
+            domain=domain,
+            texts=texts,
+        )
 
 
 def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> Iterator[None]:
@@ -91,14 +101,14 @@ def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> Iterator[None]:
     kind = KINDS[layer.kind]
     attribute = mesh.attributes.get(layer.name)
     if attribute is None:
-        attribute = mesh.attributes.new(layer.name, layer.kind, layer.domain.value)
+        attribute = mesh.attributes.new(layer.name, layer.kind, layer.domain)
     if (attribute.name, attribute.data_type) != (layer.name, layer.kind):
         raise RuntimeError("Blender has something else of this name")
     if layer.kind == "STRING":
         for start in range(0, len(layer.values), ROWS):
             rows = layer.values[start : start + ROWS, 0]
             for row, code in zip(mesh.attributes[layer.name].data[start:], rows, strict=False):
-                row.value = layer.names[code]
+                row.value = layer.texts[code]
             yield
         return
     # Blender copies whole buffers where the types agree, and reads number by number where not.

@@ -268,7 +268,7 @@ def _digest(mesh: bpy.types.Mesh, reading: Reading, live: PNS_PG_live) -> str:
     digest = hashlib.blake2b(digest_size=16)
     snapshot = reading.snapshot
     for layer in snapshot.layers:
-        digest.update(repr((layer.name, layer.kind, layer.domain, layer.names)).encode())
+        digest.update(repr((layer.name, layer.kind, layer.domain, layer.texts)).encode())
         digest.update(np.ascontiguousarray(layer.values))
     for array in (
         snapshot.points,

@@ -29,7 +29,7 @@ def remove_modifier(obj: bpy.types.Object) -> None:
         return
     group = modifier.node_group
     obj.modifiers.remove(modifier)
-    _drop(group)
+    drop_group(group)
 
 
 def point_at(obj: bpy.types.Object, cache: bpy.types.Object | None) -> None:
@@ -39,7 +39,7 @@ def point_at(obj: bpy.types.Object, cache: bpy.types.Object | None) -> None:
         return
     before = modifier.node_group
     modifier.node_group = None if cache is None else _group(cache)
-    _drop(before)
+    drop_group(before)
 
 
 def result_of(group: bpy.types.NodeTree | None) -> bpy.types.Object | None:
@@ -63,9 +63,7 @@ def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:
     for group in bpy.data.node_groups:
         if group.name.startswith(GROUP) and result_of(group) == cache:
             return group
-    group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group = new_group(GROUP)
     out = group.nodes.new("NodeGroupOutput")
     info = group.nodes.new("GeometryNodeObjectInfo")
     info.name, info.transform_space = INFO, "ORIGINAL"
@@ -74,6 +72,15 @@ def _group(cache: bpy.types.Object) -> bpy.types.NodeTree:
     return group
 
 
-def _drop(group: bpy.types.NodeTree | None) -> None:
+def new_group(name: str) -> bpy.types.NodeTree:
+    """Make nodes that take geometry and give geometry."""
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    return group
+
+
+def drop_group(group: bpy.types.NodeTree | None) -> None:
+    """Remove nodes that nothing has any more."""
     if group is not None and group.users == 0:
         bpy.data.node_groups.remove(group)

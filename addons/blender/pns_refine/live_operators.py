@@ -19,39 +19,37 @@ class _OfLive:
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is an active object that is shown live."""
+    def problem(cls, context: bpy.types.Context) -> str | None:
+        """Return why the operator cannot be used."""
         obj = context.object
         if obj is None or obj.type != "MESH" or live.modifier_of(obj) is None:
-            cls.poll_message_set("Start live mode first")
-            return False
-        if not (obj.is_editable and obj.data.is_editable):
-            cls.poll_message_set(LINKED)
-            return False
-        return True
+            return "Start live mode first"
+        return None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the operator can be used on the active object."""
+        problem, obj = cls.problem(context), context.object
+        if problem is None and not (obj.is_editable and obj.data.is_editable):
+            problem = "Linked from another file: make it local first, as live mode is kept in it"
+        if problem is not None:
+            cls.poll_message_set(problem)
+        return problem is None
 
 
-class OBJECT_OT_pns_live_add(bpy.types.Operator):  # noqa: N801 (Blender's names)
+class OBJECT_OT_pns_live_add(_OfLive, bpy.types.Operator):  # noqa: N801 (Blender's names)
     """Show the active mesh refined, and keep it editable"""
 
     bl_idname = "object.pns_live_add"
     bl_label = "Start Live Mode"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a mesh of this file is active, and not live yet."""
+    def problem(cls, context: bpy.types.Context) -> str | None:
+        """Return why live mode cannot be started."""
         obj = context.object
         if obj is None or obj.type != "MESH":
-            cls.poll_message_set("Select a mesh first")
-            return False
-        if live.modifier_of(obj) is not None:
-            cls.poll_message_set("The object is shown live already")
-            return False
-        if not (obj.is_editable and obj.data.is_editable):
-            cls.poll_message_set(LINKED)
-            return False
-        return True
+            return "Select a mesh first"
+        return None if live.modifier_of(obj) is None else "The object is shown live already"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start, and refine for the first time."""
@@ -80,14 +78,12 @@ class OBJECT_OT_pns_live_apply(_OfLive, bpy.types.Operator):  # noqa: N801 (Blen
     bl_label = "Apply"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the object is live, and its mesh is one that it can part with."""
-        if not super().poll(context):
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the present mode for Object Mode first")
-            return False
-        return True
+    def problem(cls, context: bpy.types.Context) -> str | None:
+        """Return why the object cannot have the refined mesh."""
+        left = context.mode == "OBJECT"
+        return super().problem(context) or (
+            None if left else "Leave the present mode for Object Mode first"
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refine a last time, and apply."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
+
+from pns_common.carry import rules
 
 from .attributes import KINDS, STRUCTURE
 from .reading import Reading
-from .refining.snapshot import Domain, Refined, Rule
+from .refining.snapshot import Refined
 from .words import listed
 
 # Modifiers that remember the mesh they were bound to, by the name of the flag that says so.
@@ -17,92 +18,64 @@ BOUND = {
     "LAPLACIANDEFORM": "is_bind",
     "CORRECTIVE_SMOOTH": "is_bind",
 }
+# Marks of edges for which zero is no loss.
+OWN_EDGES = {"sharp_edge", "bevel_weight_edge", "uv_seam", "freestyle_edge"}
 SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "OCEAN"}
 
 
 def losses(obj: bpy.types.Object, reading: Reading, refined: Refined) -> list[str]:
     """Tell in sentences all that an object's mesh loses, or has only in part, when refined."""
-    mesh: bpy.types.Mesh = obj.data
-    return [
-        *_of_faces(reading, refined),
-        *_of_attributes(mesh, reading),
-        *_of_normals(mesh),
-        *_of_groups(reading),
-        *_of_keys(mesh),
-        *_of_modifiers(obj),
-    ]
-
-
-def _of_faces(reading: Reading, refined: Refined) -> list[str]:
-    said = []
-    if reading.snapshot.has_polygons and (np.diff(refined.faces.starts) == 3).all():
-        said.append("Faces of more than three corners became triangles")
-    loose = int((~reading.snapshot.edge_used).sum())
-    if loose:
-        said.append(f"{loose:,} edges without faces are kept as they are, not refined")
-    return said
-
-
-def _of_attributes(mesh: bpy.types.Mesh, reading: Reading) -> list[str]:
-    said = []
-    layers = [layer for layer in reading.snapshot.layers if not layer.name.startswith(".")]
-    voted = [layer.name for layer in layers if layer.rule is Rule.VOTE]
-    if voted:
-        said.append(f"New points and corners have the value of most parents: {listed(voted)}")
-    own = {"sharp_edge", "bevel_weight_edge", "uv_seam", "freestyle_edge"}
-    edges = [x.name for x in layers if x.domain is Domain.EDGE and x.name not in own]
-    if edges:
-        said.append(f"Edges new inside faces have the value zero: {listed(edges)}")
+    mesh, snapshot, key = obj.data, reading.snapshot, obj.data.shape_keys
+    layers = [layer for layer in snapshot.layers if not layer.name.startswith(".")]
+    voted = [layer.name for layer in layers if layer.rule is rules.vote]
+    edges = [x.name for x in layers if x.domain == "EDGE" and x.name not in OWN_EDGES]
     unknown = [
         attribute.name
         for attribute in mesh.attributes
         if attribute.data_type not in KINDS and attribute.name not in STRUCTURE
     ]
-    if unknown:
-        said.append(f"Lost, of types that are not known: {listed(unknown)}")
-    if len(mesh.skin_vertices):
-        said.append("Lost: radii of the Skin modifier")
-    return said
-
-
-def _of_normals(mesh: bpy.types.Mesh) -> list[str]:
-    if not mesh.has_custom_normals:
-        return []
-    return ["Custom normals are rebuilt from those of the corners around"]
-
-
-def _of_groups(reading: Reading) -> list[str]:
-    if not reading.empty_members:
-        return []
-    return [f"{reading.empty_members:,} members of vertex groups with weight 0 are none any more"]
-
-
-def _of_keys(mesh: bpy.types.Mesh) -> list[str]:
-    key = mesh.shape_keys
-    if key is None:
-        return []
-    said = ["Shape keys are refined by the scheme's masks; the correction is the basis's"]
-    if not key.use_relative:
-        said.append("Absolute shape keys are evenly spaced in time again")
-    return said
-
-
-def _of_modifiers(obj: bpy.types.Object) -> list[str]:
-    said = []
+    kinds = {modifier.type for modifier in obj.modifiers}
     bound = [m.name for m in obj.modifiers if m.type in BOUND and getattr(m, BOUND[m.type])]
-    if bound:
-        said.append(f"To be bound again: {listed(bound)}")
-    if any(m.type == "MULTIRES" for m in obj.modifiers):
-        said.append("Lost: what was sculpted with the Multiresolution modifier")
     hooks = [m.name for m in obj.modifiers if m.type == "HOOK"]
-    if hooks:
-        said.append(f"Hooks move the old vertices alone: {listed(hooks)}")
-    if obj.particle_systems:
-        said.append("Particles and hair are to be placed again")
     simulated = [m.name for m in obj.modifiers if m.type in SIMULATED]
-    if simulated:
-        said.append(f"To be baked again: {listed(simulated)}")
-    return said
+    loose, empty = int((~snapshot.edge_used).sum()), reading.empty_members
+    levels, split = refined.report["levels"], refined.split_vertices
+    irregular = levels[0]["edges"]["irregular"] if levels else 0
+    told = (
+        (
+            snapshot.has_polygons and refined.topology.triangles,
+            "Faces of more than three corners became triangles",
+        ),
+        (loose, f"{loose:,} edges without faces are kept as they are, not refined"),
+        (voted, f"New points and corners have the value of most parents: {listed(voted)}"),
+        (edges, f"Edges new inside faces have the value zero: {listed(edges)}"),
+        (unknown, f"Lost, of types that are not known: {listed(unknown)}"),
+        (len(mesh.skin_vertices), "Lost: radii of the Skin modifier"),
+        (
+            mesh.has_custom_normals,
+            "Custom normals are rebuilt from those of the corners around",
+        ),
+        (empty, f"{empty:,} members of vertex groups with weight 0 are none any more"),
+        (key, "Shape keys are refined by the scheme's masks; the correction is the basis's"),
+        (
+            key and not key.use_relative,
+            "Absolute shape keys are evenly spaced in time again",
+        ),
+        (bound, f"To be bound again: {listed(bound)}"),
+        ("MULTIRES" in kinds, "Lost: what was sculpted with the Multiresolution modifier"),
+        (hooks, f"Hooks move the old vertices alone: {listed(hooks)}"),
+        (obj.particle_systems, "Particles and hair are to be placed again"),
+        (simulated, f"To be baked again: {listed(simulated)}"),
+        (
+            irregular,
+            f"{irregular:,} edges join more than two faces, or turned ones, and are sharp",
+        ),
+        (
+            split,
+            f"{split:,} border vertices lie on others: Merge by Distance would join them",
+        ),
+    )
+    return [text for holds, text in told if holds]
 
 
 def subdividing_modifiers(obj: bpy.types.Object) -> list[str]:
@@ -113,16 +86,3 @@ def subdividing_modifiers(obj: bpy.types.Object) -> list[str]:
         if m.type == "SUBSURF"
         and ((m.show_viewport and m.levels) or (m.show_render and m.render_levels))
     ]
-
-
-def irregularities(refined: Refined) -> list[str]:
-    """Return what was found of the mesh when it was refined."""
-    said = []
-    levels = refined.report["levels"]
-    edges = levels[0]["edges"]["irregular"] if levels else 0
-    if edges:
-        said.append(f"{edges:,} edges join more than two faces, or turned ones, and are sharp")
-    split = refined.split_vertices
-    if split:
-        said.append(f"{split:,} border vertices lie on others: Merge by Distance would join them")
-    return said

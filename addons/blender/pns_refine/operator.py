@@ -16,11 +16,13 @@ from .losses import subdividing_modifiers
 from .overlay import hide
 from .run import Key, Made, Run, Share, key_of, refine_meshes
 from .settings import Settings, choice_of, keeps_polygons
-from .words import adaptive_forecast, forecast, listed, too_many
+from .words import listed
 from .writing import take_name
 
 # Above so many faces the work goes on beside the interface, and there is no redo panel.
 AT_ONCE = 60_000
+# Above so many faces one is warned.
+MANY = 1_000_000
 # What still reaches the viewport while a run goes on.
 PASSED_ON = {
     "MIDDLEMOUSE",
@@ -44,14 +46,14 @@ def made_count(objects: list[bpy.types.Object], settings: Settings) -> int:
     made, whole = 0, keeps_polygons(settings)
     for obj in objects:
         corners, faces = len(obj.data.loops), len(obj.data.polygons)
-        polygons = whole and corners != 3 * faces
+        polygons = whole and not is_triangles(obj)
         made += corners if polygons else 4 * (corners - 2 * faces)
     return made * 4 ** (settings.levels - 1)
 
 
-def fits_at_once(faces: int) -> bool:
-    """Return whether so many faces are made without a wait that one would notice."""
-    return faces <= AT_ONCE
+def is_triangles(obj: bpy.types.Object) -> bool:
+    """Return whether all faces of an object are triangles."""
+    return len(obj.data.loops) == 3 * len(obj.data.polygons)
 
 
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -165,7 +167,7 @@ class OBJECT_OT_pns_refine(Refining, bpy.types.Operator):  # noqa: N801 (Blender
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Refine at once what is small, and the rest beside the interface."""
         leave_edit_mode(context)
-        if fits_at_once(made_count(chosen_objects(context), self)):
+        if made_count(chosen_objects(context), self) <= AT_ONCE:
             return self.execute(context)
         chosen = {name: getattr(self, name) for name in self.as_keywords()}
         bpy.ops.object.pns_refine_large("INVOKE_DEFAULT", **chosen)
@@ -305,16 +307,17 @@ def draw_forecast(
     """Show how many faces there will be, whether that is wise, and what subdivides them again."""
     made = made_count(objects, settings)
     faces = sum(len(o.data.polygons) for o in objects)
-    if settings.detail == "LEVELS":
-        text = forecast(faces, made)
-    elif any(len(o.data.loops) != 3 * len(o.data.polygons) for o in objects):
+    text = {
+        "LEVELS": f"{made:,} faces from {faces:,}",
+        "FACES": f"At most {made:,} faces, from {faces:,}",
+        "TOLERANCE": f"As many faces as that takes, from {faces:,}",
+    }[settings.detail]
+    if settings.detail != "LEVELS" and not all(map(is_triangles, objects)):
         text = "Detail is for triangles: quads are cut everywhere"
-    else:
-        text = adaptive_forecast(faces, made if settings.detail == "FACES" else None)
     layout.label(text=text, icon="INFO")
-    warning = too_many(made)
-    if warning:
-        layout.label(text=warning, icon="ERROR")
+    if made > MANY:
+        text = f"More than {MANY:,} faces: this takes long, and much memory"
+        layout.label(text=text, icon="ERROR")
     draw_subdivided(layout, objects)
 
 

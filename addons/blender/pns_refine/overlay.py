@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
-from .live_nodes import modifier_of
+from .live_nodes import drop_group, modifier_of, new_group
 
 MODIFIER = "PNS Overlay"
 GROUP = ".PNS Overlay"
@@ -104,8 +104,7 @@ def hide(obj: bpy.types.Object) -> None:
         return
     group = modifier.node_group
     obj.modifiers.remove(modifier)
-    if group is not None and group.users == 0:
-        bpy.data.node_groups.remove(group)
+    drop_group(group)
     if material is not None and material.users == 0:
         bpy.data.materials.remove(material)
 
@@ -149,9 +148,7 @@ def _linear(channel: float) -> float:
 
 def _group(material: bpy.types.Material) -> bpy.types.NodeTree:
     """Return the nodes that set a material on all faces; it stands in its node."""
-    group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group = new_group(GROUP)
     into, out = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     paint = group.nodes.new("GeometryNodeSetMaterial")
     paint.name = PAINT

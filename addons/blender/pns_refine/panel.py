@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 
 from . import live
 from .operator import OBJECT_OT_pns_refine, chosen_objects, draw_forecast, draw_subdivided
 from .overlay import TITLES, current, ramp_of, shown_mesh
-from .result import certificate_lines, in_units, largest_scale, note_lines
+from .result import certificate_lines, in_units, largest_scale
 from .settings import GOAL_OF
 
 
@@ -33,16 +35,21 @@ class VIEW3D_PT_pns(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
             draw_forecast(layout, chosen_objects(context), last)
 
 
-class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
-    """The certificate of the active object, and what is lost."""
+class _OfResult(_Panel):
+    """A panel on the active object, if it was refined."""
 
-    bl_label = "Report"
     bl_parent_id = "VIEW3D_PT_pns"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the active object was refined."""
         return shown_mesh(context.object) is not None
+
+
+class VIEW3D_PT_pns_report(_OfResult, bpy.types.Panel):  # noqa: N801 (Blender's names)
+    """The certificate of the active object, and what is lost."""
+
+    bl_label = "Report"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show sentences."""
@@ -51,23 +58,17 @@ class VIEW3D_PT_pns_report(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's na
         for line in certificate_lines(context.object, mesh, context.scene):
             column.label(text=line)
         draw_subdivided(self.layout, [context.object])
-        notes = note_lines(mesh)
+        notes = json.loads(mesh.pns_result.notes or "[]")
         if notes:
             box = self.layout.box().column(align=True)
             for line in notes:
                 box.label(text=line, icon="DOT")
 
 
-class VIEW3D_PT_pns_overlay(_Panel, bpy.types.Panel):  # noqa: N801 (Blender's names)
+class VIEW3D_PT_pns_overlay(_OfResult, bpy.types.Panel):  # noqa: N801 (Blender's names)
     """Panel of the diagnostic that is shown, with its legend."""
 
     bl_label = "Overlay"
-    bl_parent_id = "VIEW3D_PT_pns"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the active object was refined."""
-        return shown_mesh(context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show a button for each, and the ramp from 0 to the largest value."""

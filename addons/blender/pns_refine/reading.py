@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from .attributes import read_layers
-from .refining.shading import NORMALS
-from .refining.snapshot import Domain, Layer, Rule, Snapshot
-from .refining.steps import crease_sharpness_of
+from .refining.creases import crease_sharpness_of
+from .refining.shading import normals_layer, switch
+from .refining.snapshot import Layer, Snapshot
 
 # Rows of vertex weights that are read at once: about twenty milliseconds.
 ROWS = 2_000
@@ -56,7 +56,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> Generator[None, None, Reading]:
         yield
     layers += _freestyle(mesh)
     if mesh.has_custom_normals:
-        layers.append(NORMALS.of(_floats(mesh.corner_normals, "vector", 3)))
+        layers.append(normals_layer(_floats(mesh.corner_normals, "vector", 3)))
     yield
     groups, empty = yield from _weights(mesh)
     offsets = np.zeros((0, len(mesh.vertices), 3))
@@ -119,22 +119,20 @@ def _weights(mesh: bpy.types.Mesh) -> Generator[None, None, tuple[np.ndarray, in
 
 def _creases(mesh: bpy.types.Mesh, name: str, count: int) -> np.ndarray:
     attribute = mesh.attributes.get(name)
-    if attribute is None:
-        return np.zeros(count)
-    return _floats(attribute.data, "value", 1)[:, 0]
+    return np.zeros(count) if attribute is None else _floats(attribute.data, "value", 1)[:, 0]
 
 
 def _freestyle(mesh: bpy.types.Mesh) -> list[Layer]:
     """Read Freestyle's marks, where they are no attributes."""
     layers = []
-    for rows, domain in ((mesh.edges, Domain.EDGE), (mesh.polygons, Domain.FACE)):
-        name = f"freestyle_{domain.name.lower()}"
+    for rows, domain in ((mesh.edges, "EDGE"), (mesh.polygons, "FACE")):
+        name = f"freestyle_{domain.lower()}"
         if name in mesh.attributes or not rows or not hasattr(rows[0], "use_freestyle_mark"):
             continue
         marks = np.zeros(len(rows), np.bool_)
         rows.foreach_get("use_freestyle_mark", marks)
         if marks.any():
-            layers.append(Layer(name, FREESTYLE, domain, Rule.KEEP, marks[:, None]))
+            layers.append(replace(switch(name, domain, marks), kind=FREESTYLE))
     return layers
 
 

@@ -23,8 +23,7 @@ CLASSES = (
     panel.VIEW3D_PT_pns_overlay,
     panel.VIEW3D_PT_pns_live,
 )
-
-
+register_classes, unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 HANDLERS = (
     ("depsgraph_update_post", live_watch.after_update),
     ("undo_pre", live_watch.before_undo),
@@ -41,8 +40,7 @@ HANDLERS = (
 
 def register() -> None:
     """Register everything."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    register_classes()
     bpy.types.Mesh.pns_result = PointerProperty(type=result.PNS_PG_result)
     bpy.types.Mesh.pns_live = PointerProperty(type=live.PNS_PG_live)
     bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
@@ -58,5 +56,4 @@ def unregister() -> None:
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     del bpy.types.Mesh.pns_live
     del bpy.types.Mesh.pns_result
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    unregister_classes()

@@ -51,11 +51,6 @@ def largest_scale(obj: bpy.types.Object) -> float:
     return float(np.linalg.norm(np.array(obj.matrix_world.to_3x3()), 2))
 
 
-def note_lines(mesh: bpy.types.Mesh) -> list[str]:
-    """Return what does not come through unchanged."""
-    return json.loads(mesh.pns_result.notes or "[]")
-
-
 def in_units(length: float, scene: bpy.types.Scene) -> str:
     """Return a length as the scene's units word it."""
     units = scene.unit_settings

@@ -10,12 +10,11 @@ from typing import Any
 
 import bpy
 
-from .losses import irregularities, losses
+from .losses import losses
 from .reading import Reading, read_mesh
-from .refining.compute import Choice
-from .refining.job import Job, StoppedError
+from .refining.compute import Choice, compute
+from .refining.job import Job
 from .refining.snapshot import Refined
-from .refining.to_goal import refine_snapshot
 from .result import remember
 from .writing import write_mesh
 
@@ -126,7 +125,7 @@ def refine_mesh(
     mesh: bpy.types.Mesh = obj.data
     if reading is None:
         reading = yield from read_mesh(mesh)
-    job = Job(partial(refine_snapshot, reading.snapshot, choice)).start()
+    job = Job(partial(compute, reading.snapshot, choice))
     try:
         while job.running:
             share.value = (number + job.share) / count
@@ -135,9 +134,5 @@ def refine_mesh(
     finally:
         job.cancel()
     new, refused = yield from write_mesh(refined, reading, mesh, into)
-    notes = losses(obj, reading, refined) + irregularities(refined) + refused
-    remember(new, refined, notes)
+    remember(new, refined, losses(obj, reading, refined) + refused)
     return Made(mesh, new, refined)
-
-
-__all__ = ["Key", "Made", "Run", "Share", "StoppedError", "key_of", "refine_mesh", "refine_meshes"]

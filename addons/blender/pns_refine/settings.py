@@ -10,17 +10,24 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from pns_common import load_model
+from pns_common.carry.charts import Linear
 from pns_common.model.file import COMPANIONS, DEFAULT_MODEL, bundled_models
 from pns_common.model.session import OnnxModel
 
 from .refining.compute import Choice
-from .refining.snapshot import Smoothing
 
 NO_ANGLE = math.pi
 # The property that each choice of detail asks for.
 GOAL_OF = {"LEVELS": "levels", "FACES": "max_faces", "TOLERANCE": "tolerance"}
 # Rules of boundaries by the names of Blender's Subdivision Surface.
 BORDERS = {"ALL": "smooth", "PRESERVE_CORNERS": "corners"}
+# What stays linear of UV maps, by its names and by ours.
+UV_KEPT: dict[str, Linear] = {
+    "NONE": "all",
+    "PRESERVE_CORNERS": "corners only",
+    "PRESERVE_BOUNDARIES": "boundaries",
+    "SMOOTH_ALL": "none",
+}
 # Since 5.0 a path says whether it may begin at the folder of the file, "//".
 PATH_OPTIONS = {"ANIMATABLE"}
 if bpy.app.version >= (5, 0, 0):
@@ -219,7 +226,7 @@ def choice_of(settings: Settings) -> Choice:
         crease_angle=None if angle >= NO_ANGLE else angle,
         crease_lines=settings.crease_lines,
         border=BORDERS[settings.border],
-        uv_smooth=Smoothing(settings.uv_smooth),
+        uv_keep=UV_KEPT[settings.uv_smooth],
         tolerance=f"{settings.tolerance}%" if settings.detail == "TOLERANCE" else None,
         max_faces=settings.max_faces if settings.detail == "FACES" else None,
     )

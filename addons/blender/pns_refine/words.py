@@ -5,26 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-MANY = 1_000_000
-
-
-def forecast(faces: int, made: int) -> str:
-    """Tell how many faces there will be."""
-    return f"{made:,} faces from {faces:,}"
-
-
-def adaptive_forecast(faces: int, most: int | None) -> str:
-    """Tell how many faces there will be where the surface bends alone."""
-    made = "As many faces as that takes" if most is None else f"At most {most:,} faces"
-    return f"{made}, from {faces:,}"
-
-
-def too_many(made: int) -> str | None:
-    """Return a warning where there will be more faces than work well."""
-    if made <= MANY:
-        return None
-    return f"More than {MANY:,} faces: this takes long, and much memory"
-
 
 def certificate(
     report: dict[str, Any], farthest: float, length: Callable[[float], str]

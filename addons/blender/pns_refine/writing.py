@@ -10,8 +10,8 @@ import numpy as np
 from .animation import copy_animation
 from .attributes import is_carried, write_layer
 from .reading import FREESTYLE, Reading
-from .refining.snapshot import Domain, Refined
-from .refining.steps import crease_of
+from .refining.creases import crease_of
+from .refining.snapshot import Refined
 
 # What a mesh that is shown live says of its refined copy, and of itself.
 CACHE = ("cache", "spare", "first", "second")
@@ -86,23 +86,23 @@ def take_name(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
 
 
 def _write_faces(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:
-    faces = refined.faces
+    faces = refined.topology
     mesh.vertices.add(len(refined.points))
     mesh.edges.add(len(refined.edges))
     yield
-    mesh.loops.add(len(faces.vertices))
-    mesh.polygons.add(len(faces.parents))
+    mesh.loops.add(len(faces.corners))
+    mesh.polygons.add(faces.face_count)
     yield
     mesh.attributes["position"].data.foreach_set("vector", _flat(refined.points, np.float32))
     yield
     # Attributes are copied as a block; the same numbers as properties are set one by one.
     mesh.attributes[".edge_verts"].data.foreach_set("value", _flat(refined.edges, np.int32))
     yield
-    mesh.polygons.foreach_set("loop_start", _flat(faces.starts[:-1], np.int32))
+    mesh.polygons.foreach_set("loop_start", _flat(faces.offsets[:-1], np.int32))
     yield
-    mesh.attributes[".corner_vert"].data.foreach_set("value", _flat(faces.vertices, np.int32))
+    mesh.attributes[".corner_vert"].data.foreach_set("value", _flat(faces.corners, np.int32))
     yield
-    mesh.attributes[".corner_edge"].data.foreach_set("value", _flat(faces.edges, np.int32))
+    mesh.attributes[".corner_edge"].data.foreach_set("value", _flat(faces.corner_edges, np.int32))
     yield
 
 
@@ -110,7 +110,7 @@ def _write_layers(mesh: bpy.types.Mesh, refined: Refined) -> Generator[None, Non
     lost = []
     for layer in refined.layers:
         if layer.kind == FREESTYLE:
-            rows = mesh.edges if layer.domain is Domain.EDGE else mesh.polygons
+            rows = mesh.edges if layer.domain == "EDGE" else mesh.polygons
             rows.foreach_set("use_freestyle_mark", _flat(layer.values, np.bool_))
         elif is_carried(layer.name) and layer.kind != "NORMAL":
             try:
@@ -118,27 +118,29 @@ def _write_layers(mesh: bpy.types.Mesh, refined: Refined) -> Generator[None, Non
             except (RuntimeError, KeyError) as error:
                 lost.append(f"Attribute {layer.name}: {error}")
         yield
-    creases = {"EDGE": refined.crease_sharpness, "POINT": refined.vertex_sharpness}
-    for (domain, sharpness), name in zip(
-        creases.items(), ("crease_edge", "crease_vert"), strict=True
-    ):
-        if (sharpness > 0).any():
-            crease = mesh.attributes.new(name, "FLOAT", domain)
-            crease.data.foreach_set("value", _flat(crease_of(sharpness), np.float32))
+    if (refined.crease_sharpness > 0).any():
+        _write_floats(mesh, "crease_edge", crease_of(refined.crease_sharpness), "EDGE")
+    if (refined.vertex_sharpness > 0).any():
+        _write_floats(mesh, "crease_vert", crease_of(refined.vertex_sharpness))
     for name, values in zip(SHOWN, (refined.ratio, refined.gate, refined.distance), strict=True):
-        mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set(
-            "value", _flat(values, np.float32)
-        )
+        _write_floats(mesh, name, values)
         yield
     return lost
+
+
+def _write_floats(
+    mesh: bpy.types.Mesh, name: str, values: np.ndarray, domain: str = "POINT"
+) -> bpy.types.Attribute:
+    attribute = mesh.attributes.new(name, "FLOAT", domain)
+    attribute.data.foreach_set("value", _flat(values, np.float32))
+    return attribute
 
 
 def _write_groups(carrier: bpy.types.Object, refined: Refined, reading: Reading) -> Iterator[None]:
     """Write vertex groups as attributes, which Blender turns into groups itself, and fast."""
     mesh = carrier.data
     for group, weights in zip(reading.groups, refined.groups.T, strict=True):
-        attribute = mesh.attributes.new(".pns weights", "FLOAT", "POINT")
-        attribute.data.foreach_set("value", _flat(weights, np.float32))
+        attribute = _write_floats(mesh, ".pns weights", weights)
         mesh.attributes.active = mesh.attributes[attribute.name]
         # Whatever is edited meanwhile, the carrier is not.
         with bpy.context.temp_override(object=carrier, active_object=carrier, edit_object=None):
@@ -190,21 +192,17 @@ def _write_normals(mesh: bpy.types.Mesh, refined: Refined) -> Iterator[None]:
 
 def _choose_as(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     """Mark the same UV maps, colours and attribute as the active ones."""
-    for old, new in ((source.uv_layers, mesh.uv_layers),):
-        for before in old:
-            after = new.get(before.name)
-            if after is not None:
-                after.active_render, after.active_clone = before.active_render, before.active_clone
+    for before in source.uv_layers:
+        after = mesh.uv_layers.get(before.name)
+        if after is not None:
+            after.active_render, after.active_clone = before.active_render, before.active_clone
+    attributes = mesh.attributes
+    for name in ("active_color_name", "default_color_name"):
+        if getattr(source.attributes, name) in attributes:
+            setattr(attributes, name, getattr(source.attributes, name))
+    for old, new in ((source.uv_layers, mesh.uv_layers), (source.attributes, attributes)):
         if old.active is not None and old.active.name in new:
             new.active = new[old.active.name]
-    old, new = source.attributes, mesh.attributes
-    if old.active_color_name in new:
-        new.active_color_name = old.active_color_name
-    if old.default_color_name in new:
-        new.default_color_name = old.default_color_name
-    active = old.active
-    if active is not None and active.name in new:
-        new.active = new[active.name]
 
 
 def _flat(values: np.ndarray, dtype: type) -> np.ndarray:

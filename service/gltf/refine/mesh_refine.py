@@ -17,7 +17,8 @@ from pns_common.mesh.topology import Topology, split_faces
 from pns_common.operator.scheme import Scheme
 from pns_common.operator.sharpness import creases_by_name
 from pns_common.parallel import Blocks, available_threads
-from pns_common.refinement import Refinement, refine, refine_many
+from pns_common.refined import Refinement
+from pns_common.refinement import refine, refine_many
 from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 

@@ -1,25 +1,32 @@
 """Meshes of quads as snapshots, for what needs no Blender."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 
 from addons.blender.pns_refine.refining.snapshot import Layer, Snapshot
+from pns_common.carry import rules
+from tests.support.polygons import CUBE, CUBE_FACES
 
-CUBE_POINTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-CUBE_SIDES = np.array(
-    [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-)
+CUBE_POINTS, CUBE_SIDES = 2 * CUBE - 1, np.array(CUBE_FACES)
 
 
-def cube(crease_sharpness: float | np.ndarray = 0.0, layers: tuple[Layer, ...] = ()) -> Snapshot:
+def layer(domain, rule, values, name="mine", kind="FLOAT", **more):
+    """An attribute."""
+    return Layer(np.asarray(values), rule, name=name, kind=kind, domain=domain, **more)
+
+
+def switch(name, domain, on):
+    """An attribute of yes and no."""
+    return layer(domain, rules.old, np.asarray(on, dtype=bool)[:, None], name, "BOOLEAN")
+
+
+def cube(sharpness=0.0, *layers):
     """A cube of six quads, whose edges are all this sharp."""
-    return snapshot(CUBE_POINTS, CUBE_SIDES, crease_sharpness, layers)
+    return snapshot(CUBE_POINTS, CUBE_SIDES, sharpness, layers)
 
 
-def grid(cells: int, layers: tuple[Layer, ...] = ()) -> Snapshot:
+def grid(cells, *layers):
     """A hilly square of so many quads a side."""
     side = cells + 1
     across, along = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side), indexing="ij")
@@ -29,23 +36,17 @@ def grid(cells: int, layers: tuple[Layer, ...] = ()) -> Snapshot:
     return snapshot(points.reshape(-1, 3), quads, 0.0, layers)
 
 
-def cut(shape: Snapshot) -> Snapshot:
+def cut(shape):
     """The same mesh, whose polygons are the triangles."""
     count = len(shape.triangles)
     starts, corners = 3 * np.arange(count + 1), np.arange(3 * count).reshape(-1, 3)
     return replace(shape, corners=corners, polygons=np.arange(count), polygon_corners=starts)
 
 
-def snapshot(
-    points: np.ndarray,
-    quads: np.ndarray,
-    crease_sharpness: float | np.ndarray,
-    layers: tuple[Layer, ...],
-) -> Snapshot:
-    """Return what is read of these quads, each cut along the diagonal from its first corner."""
+def snapshot(points, quads, sharpness=0.0, layers=()):
+    """The snapshot of these quads, each cut along the diagonal from its first corner."""
     first = 4 * np.arange(len(quads))[:, None]
-    halves = first[:, None] + np.array([[0, 1, 2], [0, 2, 3]])
-    corners = halves.reshape(-1, 3)
+    corners = (first[:, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     edges = np.unique(np.sort(sides, axis=1), axis=0)
     return Snapshot(
@@ -55,9 +56,9 @@ def snapshot(
         polygons=np.repeat(np.arange(len(quads)), 2),
         polygon_corners=4 * np.arange(len(quads) + 1),
         edges=edges,
-        crease_sharpness=np.broadcast_to(np.asarray(crease_sharpness, float), len(edges)).copy(),
+        crease_sharpness=np.broadcast_to(np.asarray(sharpness, float), len(edges)).copy(),
         vertex_sharpness=np.zeros(len(points)),
         groups=np.zeros((len(points), 0)),
         offsets=np.zeros((0, len(points), 3)),
-        layers=layers,
+        layers=tuple(layers),
     )

@@ -7,41 +7,22 @@ REPORT = {"scheme": "pns", "model": "general", "budget": 0.8, "levels": [LEVEL, 
 REPORT |= {"limit_distance": 0.5, "limit_distance_bound": 2.0}
 
 
-def test_the_forecast_counts_faces():
-    assert words.forecast(1000, 64_000) == "64,000 faces from 1,000"
-
-
-def test_more_than_a_million_is_warned_of():
-    assert words.too_many(1_000_000) is None
-    assert "1,000,000" in words.too_many(1_000_001)
+def certificate(**changed):
+    return " ".join(words.certificate(REPORT | changed, 0.25, lambda x: f"{1000 * x:g} mm"))
 
 
 def test_the_certificate_names_distance_share_and_folds():
-    text = " ".join(words.certificate(REPORT, 0.25, lambda x: f"{1000 * x:g} mm"))
-    for part in (
-        "2 levels",
-        "model general",
-        "C = 0.8",
-        "250 mm",
-        "500 mm",
-        "allow 2000 mm",
-        "50 %",
-        "No face is flipped",
-    ):
-        assert part in text
-
-
-def test_flipped_faces_are_not_kept_quiet():
-    level = LEVEL | {"flipped_faces": 3}
-    text = " ".join(words.certificate(REPORT | {"levels": [level]}, 0.0, str))
+    text = certificate()
+    parts = "2 levels", "model general", "C = 0.8", "250 mm", "500 mm", "allow 2000 mm", "50 %"
+    assert all(part in text for part in parts)
+    assert "No face is flipped" in text
+    text = certificate(levels=[LEVEL | {"flipped_faces": 3}])
     assert "3 faces are flipped" in text
     assert "1 level of" in text
-
-
-def test_loop_needs_no_certificate():
-    assert words.certificate({"scheme": "loop", "levels": [LEVEL]}, 0.0, str) == [
-        "1 level of Loop, without correction"
-    ]
+    assert certificate(scheme="loop") == "2 levels of Loop, without correction"
+    goal = certificate(adaptive={"faces": 5000, "distance_max": 0.001})
+    assert "5,000 faces where the surface bends, by PNS" in goal
+    assert "than 1 mm" in goal
 
 
 def test_long_lists_are_cut():

@@ -169,28 +169,23 @@ def test_images_are_embedded_where_the_document_may_hold_their_type(
         assert any(extension in change["what"] for change in result.report["changes"])
 
 
-@pytest.mark.parametrize("content", [None, b"no image"])
-def test_an_image_that_cannot_be_embedded_keeps_its_uri(content):
-    text, binary = external(images=["a.png"])
-    others = {} if content is None else {"a__png": content}
-    tree, _ = files.unpack(refine(text, beside(box__bin=binary, **others)).glb)
-    assert tree["images"] == [{"uri": "a.png"}]
-
-
 @pytest.mark.parametrize(
     ("uri", "why"),
     [
+        ("notes.txt", "is no known type of image"),
         ("a.png", "did not come with the document"),
         ("../textures/a.png", "leads out of the document's folder"),
         ("/a.png", "leads out of the document's folder"),
     ],
 )
-def test_an_image_that_did_not_come_is_told_by_its_name(uri, why):
-    text, binary = external(images=[uri, "https://example.org/a.png"])
-    changes = refine(text, beside(box__bin=binary)).report["changes"]
-    assert [change for change in changes if change["pointer"].startswith("/images")] == [
-        {"pointer": "/images/0", "what": f"kept by its URI: {uri} {why}", "count": 1}
-    ]
+def test_an_image_that_cannot_be_embedded_keeps_its_uri_and_says_why(uri, why):
+    images = [uri, "https://example.org/a.png"]
+    text, binary = external(images=images)
+    result = refine(text, beside(box__bin=binary, notes__txt=b"no image"))
+    assert files.unpack(result.glb)[0]["images"] == [{"uri": image} for image in images]
+    changes = [c for c in result.report["changes"] if c["pointer"].startswith("/images")]
+    told = f"kept by its URI: {uri} {why}"
+    assert changes == [{"pointer": "/images/0", "what": told, "count": 1}]
 
 
 def test_an_image_in_the_json_comes_into_the_gltf_s_buffer():

@@ -1,12 +1,13 @@
-"""A service alone, and one behind the proxy of deploy/."""
+"""A service alone, one behind the proxy of deploy/, and a client of a module's own service."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import httpx2
 import pytest
 
-from tests.support.live import served
+from tests.support.live import GLB, served
 from tests.support.proxy import proxied
 
 MIB = 2**20
@@ -27,3 +28,12 @@ def front(
             proxied(behind, folder) as address,
         ):
             yield address
+
+
+@pytest.fixture
+def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
+    """A client of the `address` of a module's own service."""
+    with httpx2.Client(
+        base_url=f"http://{address[0]}:{address[1]}", headers=GLB, timeout=600
+    ) as opened:
+        yield opened

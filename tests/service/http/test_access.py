@@ -15,10 +15,7 @@ from service.http.access.origins import Origins
 from service.http.app import create_app
 from service.http.problems import Checked
 from service.settings import Settings
-from tests.support import stand_in_jobs as jobs
-from tests.support.live import local, served
-
-GLB = {"Content-Type": "model/gltf-binary"}
+from tests.support.live import GLB, local, obeying, served
 
 
 @pytest.mark.parametrize(
@@ -62,9 +59,7 @@ def keys_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def client(keys_file):
-    settings = Settings(workers=1, keys_file=keys_file)
-    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    with local(app, raise_server_exceptions=False) as opened:
+    with obeying(keys_file=keys_file) as opened:
         yield opened
 
 
@@ -116,9 +111,7 @@ def test_while_a_key_is_replaced_both_are_keys_of_one_client(tmp_path, caplog):
     fresh, other = "pns_studio_" + "n" * 43, "pns_studio_" + "o" * 43
     entries = [Entry(name="studio", hash=hash_of(key)) for key in (KEY, fresh)]
     path.write_text("\n\n".join(map(written, entries)))
-    settings = Settings(workers=1, keys_file=path)
-    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    with local(app) as client:
+    with obeying(keys_file=path) as client:
         statuses = [
             client.post("/subdivide", content=b"echo", headers=GLB | bearer(key)).status_code
             for key in (KEY, fresh, other)
@@ -126,8 +119,8 @@ def test_while_a_key_is_replaced_both_are_keys_of_one_client(tmp_path, caplog):
         assert statuses == [200, 200, 401]
     # Without the old entry its key is no key.
     path.write_text(written(entries[1]))
-    with local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)) as client:
-        statuses = [client.get("/limits", headers=bearer(key)).status_code for key in (KEY, fresh)]
+    client = obeying(keys_file=path)
+    statuses = [client.get("/limits", headers=bearer(key)).status_code for key in (KEY, fresh)]
     assert statuses == [401, 200]
 
 
@@ -184,19 +177,15 @@ def test_the_bearer_of_a_key_is_served(client, scheme):
         f"Bearer {KEY}x",
     ],
 )
-def test_a_wrong_key_is_refused_wherever_it_is_sent(keys_file, authorization):
-    settings = Settings(workers=1, keys_file=keys_file)
-    app = create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up)
-    client = local(app)
-    headers = {"Authorization": authorization}
-    assert client.get("/healthz", headers=headers).status_code == 401
-    assert KEY not in client.get("/healthz", headers=headers).text
+def test_a_wrong_key_is_refused_wherever_it_is_sent(client, authorization):
+    answer = client.get("/healthz", headers={"Authorization": authorization})
+    assert answer.status_code == 401
+    assert KEY not in answer.text
 
 
 def test_however_many_wrong_keys_come_a_right_one_is_served(keys_file):
     """From the same address and of the same name, and by one that was not seen before."""
-    settings = Settings(workers=1, keys_file=keys_file)
-    client = local(create_app(settings, job=jobs.obey, warm_up=jobs.no_warm_up))
+    client = obeying(keys_file=keys_file)
     wrong = [
         client.get("/healthz", headers=bearer(f"pns_studio_{n:043d}")).status_code
         for n in range(200)
@@ -229,9 +218,8 @@ EVERYBODY, NO_PROXY = ["everybody: no PNS_KEYS_FILE"], "no PNS_PROXIES are set"
 def test_the_service_says_at_start_to_whom_it_is_open_and_what_it_leaves_to_a_proxy(
     keys_file, with_keys, settings, open_to, without_proxy, caplog
 ):
-    chosen = Settings(workers=1, keys_file=keys_file if with_keys else None, **settings)
-    app = create_app(chosen, job=jobs.obey, warm_up=jobs.no_warm_up)
-    with caplog.at_level(logging.INFO), local(app):
+    keys = {"keys_file": keys_file} if with_keys else {}
+    with caplog.at_level(logging.INFO), obeying(**keys, **settings):
         pass
     assert re.findall(r"open to (.*?)(?: is set)?$", caplog.text, re.M) == open_to
     assert (NO_PROXY in caplog.text) is without_proxy
@@ -240,14 +228,20 @@ def test_the_service_says_at_start_to_whom_it_is_open_and_what_it_leaves_to_a_pr
 # Other origins
 
 
-def cross(client, method="GET", **headers):
-    return client.request(method, "/healthz", headers={"Origin": "https://a.example"} | headers)
-
-
-def test_no_other_origin_may_ask_unless_it_is_named():
-    with local(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
-        assert "access-control-allow-origin" not in cross(client).headers
-        assert cross(client, "OPTIONS").status_code == 405
+@pytest.mark.parametrize(("origins", "named"), [("", False), ("https://a.example", True)])
+def test_no_other_origin_may_ask_unless_it_is_named(keys_file, origins, named):
+    client = obeying(cors_origins=origins, keys_file=keys_file)
+    headers = {"Origin": "https://a.example"}
+    answer = client.get("/healthz", headers=headers).headers
+    assert answer.get("access-control-allow-origin") == ("https://a.example" if named else None)
+    assert ("X-Request-ID" in answer.get("access-control-expose-headers", "")) is named
+    headers["Access-Control-Request-Method"] = "POST"
+    headers["Access-Control-Request-Headers"] = (
+        "Authorization, Content-Type, If-None-Match, traceparent, tracestate, X-Request-ID"
+    )
+    assert client.options("/healthz", headers=headers).status_code == (200 if named else 405)
+    other = client.get("/healthz", headers={"Origin": "https://b.example"})
+    assert "access-control-allow-origin" not in other.headers
 
 
 @pytest.mark.parametrize(
@@ -308,33 +302,22 @@ NAMED = {"hosts": "pns.example, *.pns.example"}
         ({"hosts": "*"}, "evil.example", 200),
         # Nobody else's: probes ask an address, whatever is named.
         *((settings, host, 200) for settings in ({}, NAMED) for host in OWN),
+        ({"host": "Node.example"}, "node.example", 200),
     ],
 )
 def test_only_the_names_of_the_service_are_served(listens, settings, host, status):
-    app = create_app(Settings(workers=1, host=listens, **settings), warm_up=jobs.no_warm_up)
+    client = obeying(**{"host": listens} | settings)
     sent = {"Host": host, "Origin": f"http://{host}"}
-    answer = local(app).get("/healthz", headers=sent)
+    answer = client.get("/healthz", headers=sent)
     assert answer.status_code == status
     if status != 200:
         assert answer.json()["code"] == "unknown-host"
 
 
-def test_a_host_to_listen_on_is_a_name_of_the_service():
-    app = create_app(Settings(workers=1, host="Node.example"), warm_up=jobs.no_warm_up)
-    assert local(app, base_url="http://node.example").get("/healthz").status_code == 200
-
-
-@pytest.mark.parametrize("hosts", ["http://a.example", "a.example:80", "a*.example", "a/b"])
-def test_what_is_no_host_is_refused_at_start(hosts):
-    with pytest.raises(ValueError, match="no host name"):
-        Settings(hosts=hosts)
-
-
 def test_the_service_refuses_such_a_form():
-    with local(create_app(Settings(workers=1), warm_up=jobs.no_warm_up)) as client:
-        form = {"files": {"file": ("a.glb", b"glTF")}}
-        answer = client.post("/report", headers={"Sec-Fetch-Site": "cross-site"}, **form)
-        assert (answer.status_code, answer.json()["code"]) == (403, "foreign-origin")
+    form = {"files": {"file": ("a.glb", b"glTF")}}
+    answer = obeying().post("/report", headers={"Sec-Fetch-Site": "cross-site"}, **form)
+    assert (answer.status_code, answer.json()["code"]) == (403, "foreign-origin")
 
 
 def test_no_answer_is_for_a_browser_to_guess():
@@ -344,18 +327,3 @@ def test_no_answer_is_for_a_browser_to_guess():
             answer = client.getresponse()
             answer.read()
             assert answer.headers.get_all("x-content-type-options") == ["nosniff"], path
-
-
-def test_a_named_origin_may(keys_file):
-    settings = Settings(workers=1, cors_origins="https://a.example", keys_file=keys_file)
-    client = local(create_app(settings, warm_up=jobs.no_warm_up))
-    answer = cross(client)
-    assert answer.headers["access-control-allow-origin"] == "https://a.example"
-    assert "X-Request-ID" in answer.headers["access-control-expose-headers"]
-    asks = {"Access-Control-Request-Method": "POST"}
-    asks["Access-Control-Request-Headers"] = (
-        "Authorization, Content-Type, If-None-Match, traceparent, tracestate, X-Request-ID"
-    )
-    assert cross(client, "OPTIONS", **asks).status_code == 200
-    other = client.get("/healthz", headers={"Origin": "https://b.example"})
-    assert "access-control-allow-origin" not in other.headers

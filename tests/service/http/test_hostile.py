@@ -14,35 +14,15 @@ from contextlib import ExitStack, closing, suppress
 
 import pytest
 
-from tests.support.live import served
+from tests.support.live import GLB, received, request_head, served
 from tests.support.proxy import proxied
 
 PATIENCE = 60
 MIB = 2**20
-HEAD = "{} {} HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n{}\r\n"
-CHUNKED = "Transfer-Encoding: chunked\r\n"
-GLB = {"Content-Type": "model/gltf-binary"}
 
 
 def connect(address):
     return socket.create_connection(address, timeout=PATIENCE)
-
-
-def head(method, path, more=""):
-    return HEAD.format(method, path, more).encode()
-
-
-def received(connection):
-    """All that the server sends before it ends the connection."""
-    pieces = []
-    with suppress(ConnectionResetError):
-        while piece := connection.recv(2**16):
-            pieces.append(piece)
-    return b"".join(pieces)
-
-
-def status(answer):
-    return int(answer.split(maxsplit=2)[1])
 
 
 def is_served(address):
@@ -62,16 +42,13 @@ def wait_until_served(address):
     pytest.fail("the service does not recover")
 
 
-@pytest.mark.parametrize(
-    ("method", "path"),
-    [("GET", "/healthz"), ("POST", "/nothing"), ("POST", "/subdivide?levels=9")],
-)
+@pytest.mark.parametrize("target", ["GET /healthz", "POST /nothing", "POST /subdivide?levels=9"])
 # Alone uvicorn reads such a body to its end, and drops it.
 @pytest.mark.parametrize("front", ["behind the proxy"], indirect=True)
-def test_a_body_that_no_route_reads_ends_and_is_kept_nowhere(front, method, path):
+def test_a_body_that_no_route_reads_ends_and_is_kept_nowhere(front, target):
     chunk = b"10000\r\n" + bytes(2**16) + b"\r\n"
     with connect(front) as connection:
-        connection.sendall(head(method, path, CHUNKED))
+        connection.sendall(request_head("Transfer-Encoding: chunked", target=target))
         # Reset, or a broken pipe.
         with pytest.raises(OSError):  # noqa: PT011, PT012
             while True:
@@ -125,9 +102,9 @@ def test_behind_the_proxy_one_address_that_fills_its_share_keeps_nobody_out(tmp_
         proxied(behind, tmp_path) as address,
         ExitStack() as opened,
     ):
-        upload = "Content-Length: 1000\r\nX-Client: 192.0.2.1\r\n"
+        upload = request_head("Content-Length: 1000", "X-Client: 192.0.2.1")
         for _ in range(100):
             connection = opened.enter_context(connect(address))
             with suppress(OSError):
-                connection.sendall(head("POST", "/subdivide", upload))
+                connection.sendall(upload)
         assert is_served(address)

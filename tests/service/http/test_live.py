@@ -5,15 +5,14 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx2
 import pytest
 
-from tests.support.live import served
+from tests.support.live import received, request_head, served, until
 
-GLB = {"Content-Type": "model/gltf-binary"}
 MIB = 2**20
 GO_ON = b"HTTP/1.1 100 Continue\r\n\r\n"
 CUT_OFF = "an answer is cut off: its client is too slow"
@@ -27,45 +26,19 @@ def address() -> Iterator[tuple[str, int]]:
         yield where
 
 
-@pytest.fixture
-def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
-    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=600) as opened:
-        yield opened
-
-
 def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
-    return client.post("/subdivide", content=body, headers=GLB)
+    return client.post("/subdivide", content=body)
 
 
-def request_head(length: int, *, extra: str = "", kind: str = "model/gltf-binary") -> bytes:
-    return (
-        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\n"
-        f"Content-Type: {kind}\r\nContent-Length: {length}\r\n{extra}\r\n"
-    ).encode()
-
-
-def begin(connection: socket.socket) -> None:
-    """The head of an upload; comes back once the service reads its body."""
-    connection.sendall(request_head(100, extra="Expect: 100-continue\r\n"))
-    go_on = connection.recv(len(GO_ON), socket.MSG_WAITALL)
-    assert go_on == GO_ON
-
-
-def until(holds: Callable[[], bool]) -> None:
-    while not holds():
-        time.sleep(0.005)
-
-
-def received(connection: socket.socket) -> bytes:
-    """All that the server sends before it closes."""
-    return b"".join(iter(lambda: connection.recv(4096), b""))
+def head_of(length: int, *more: str) -> bytes:
+    return request_head(f"Content-Length: {length}", *more)
 
 
 def test_healthz_answers_while_a_job_holds_its_interpreter(
     address: tuple[str, int], client: httpx2.Client
 ) -> None:
     with socket.create_connection(address) as job:
-        job.sendall(request_head(4) + b"hold")
+        job.sendall(head_of(4) + b"hold")
         # A probe that waited for the job would never come back.
         assert [client.get("/healthz").status_code for _ in range(50)] == [200] * 50
         job.setblocking(False)
@@ -90,7 +63,9 @@ def test_a_client_that_leaves_during_its_upload_is_forgotten(
 ) -> None:
     for _ in range(6):
         with socket.create_connection(address) as connection:
-            begin(connection)
+            connection.sendall(head_of(100, "Expect: 100-continue"))
+            # Now it reads the body.
+            assert connection.recv(len(GO_ON), socket.MSG_WAITALL) == GO_ON
             connection.sendall(b"half")
     assert subdivide(client, b"here").content == b"here"
 
@@ -100,7 +75,7 @@ def test_a_client_that_leaves_during_its_upload_is_forgotten(
 )
 def test_408_for_an_upload_that_stops_or_takes_too_long(limits: dict[str, float]) -> None:
     with served(workers=1, **limits) as where, socket.create_connection(where) as connection:
-        connection.sendall(request_head(100))
+        connection.sendall(head_of(100))
         for _ in range(4):
             # Slow, but never idle.
             time.sleep(0.4)
@@ -112,7 +87,7 @@ def test_408_for_an_upload_that_stops_or_takes_too_long(limits: dict[str, float]
 
 def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> None:
     with socket.create_connection(address) as connection:
-        connection.sendall(request_head(10**12, extra="Expect: 100-continue\r\n"))
+        connection.sendall(head_of(10**12, "Expect: 100-continue"))
         answer = connection.recv(4096)
     assert answer.startswith(b"HTTP/1.1 413 ")
 
@@ -128,13 +103,10 @@ def test_a_client_that_does_not_read_is_cut_off(
 ) -> None:
     body = f"large {48 * MIB}".encode().ljust(100)
     with socket.create_connection(address) as connection:
-        connection.sendall(request_head(len(body)) + body)
+        connection.sendall(head_of(len(body)) + body)
         # Nothing is read until the service has given up.
         until(lambda: any(message == CUT_OFF for message in caplog.messages))
-        received = 0
-        while piece := connection.recv(MIB):
-            received += len(piece)
-    assert received < 48 * MIB
+        assert len(received(connection)) < 48 * MIB
     assert subdivide(client, b"here").content == b"here"
 
 
@@ -144,9 +116,9 @@ def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(
     large = f"large {48 * MIB}".encode().ljust(100)
     for sent, answered in (
         (b"GET /healthz HTT", 0),
-        (request_head(100) + b"half", 0),
+        (head_of(100) + b"half", 0),
         (b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n", 1),
-        (request_head(len(large)) + large, 1),
+        (head_of(len(large)) + large, 1),
     ):
         with socket.create_connection(address) as connection:
             # Closed with what was not taken, so at once.

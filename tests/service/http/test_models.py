@@ -1,10 +1,11 @@
-"""GET /models, and `model=` in a request: through the whole application and its workers."""
+"""Models by name: in GET /models, in a request's `model=`, and in a worker."""
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,17 +14,21 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from pns_common.model import file as model_file
 from pns_common.model.file import DEFAULT_MODEL, load_model
+from service.errors import NoModelError
 from service.http.app import create_app
 from service.meshfiles.example import part_glb
 from service.settings import Settings
+from service.workers.models import Models, catalogue_of
 from tests.support import stand_in_jobs as jobs
-from tests.support.live import local
+from tests.support.live import GLB, local
 from tests.support.networks import DEFAULT_CARD
-from tests.support.packages import several_models
+from tests.support.packages import served_file, several_models
+from tests.support.stand_in_models import ZeroModel
 
-GLB = {"Content-Type": "model/gltf-binary", "Accept": "application/json"}
-REPORT = "/subdivide?diagnostics=none"
+REPORT = "/report?diagnostics=none"
+NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
 
 
 @pytest.fixture(scope="module")
@@ -31,16 +36,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return several_models(tmp_path_factory.mktemp("package") / "models")
 
 
-@contextmanager
-def served(folder: Path, model: str | None = None) -> Iterator[TestClient]:
-    warm_up = partial(jobs.hold_among, str(folder))
-    with local(create_app(Settings(workers=1, model=model), warm_up=warm_up)) as client:
-        yield client
+# Through the whole application and its workers
 
 
 @pytest.fixture(scope="module")
 def client(folder: Path) -> Iterator[TestClient]:
-    with served(folder) as opened:
+    warm_up = partial(jobs.hold_among, str(folder))
+    with local(create_app(Settings(workers=1), warm_up=warm_up)) as opened:
         yield opened
 
 
@@ -52,14 +54,6 @@ def report(client: TestClient, query: str) -> dict[str, Any]:
     answer = subdivide(client, query)
     assert answer.status_code == 200, answer.text
     return answer.json()
-
-
-def assert_unknown(answer: httpx2.Response, names: list[str]) -> None:
-    assert answer.status_code == 422
-    document = answer.json()
-    assert (document["code"], document["parameter"]) == ("invalid-parameter", "model")
-    assert document["choices"] == names
-    assert all(name in document["detail"] for name in names)
 
 
 def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
@@ -78,7 +72,11 @@ def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
 @pytest.mark.parametrize("scheme", ["pns", "loop"])
 def test_422_for_what_is_no_models_name(client: TestClient, name: str, scheme: str) -> None:
     answer = subdivide(client, f"model={name}&scheme={scheme}")
-    assert_unknown(answer, sorted({"broken", "paper", "vertices", DEFAULT_MODEL}))
+    assert answer.status_code == 422
+    document = answer.json()
+    assert (document["code"], document["parameter"]) == ("invalid-parameter", "model")
+    assert document["choices"] == NAMES
+    assert all(known in document["detail"] for known in NAMES)
 
 
 def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client: TestClient) -> None:
@@ -98,17 +96,19 @@ def test_503_for_a_bundled_model_that_does_not_load_and_for_it_alone(client: Tes
     assert client.get("/readyz").status_code == 200
 
 
-def test_models_are_listed_with_their_cards(client: TestClient) -> None:
+def test_models_are_listed_with_what_their_files_say(client: TestClient, folder: Path) -> None:
     answer = client.get("/models")
     assert answer.status_code == 200
     assert answer.headers["content-type"] == "application/json"
     entries = {entry["name"]: entry for entry in answer.json()}
     # One that does not load has nothing to say of itself.
-    assert set(entries) == {"paper", "vertices", DEFAULT_MODEL}
+    assert list(entries) == [name for name in NAMES if name != "broken"]
     assert [name for name, entry in entries.items() if entry["default"]] == [DEFAULT_MODEL]
-    assert entries["vertices"]["features"] == "directed-28"
     for name, entry in entries.items():
-        assert report(client, f"model={name}")["model_hash"] == entry["hash"]
+        model = load_model(str(folder / f"{name}.onnx"))
+        assert (entry["hash"], entry["size"]) == (model.hash, model.size)
+        assert asdict(model.card).items() <= entry.items()
+        assert report(client, f"model={name}")["model_hash"] == model.hash
     properties = client.get("/openapi.json").json()["components"]["schemas"]["ModelEntry"]
     assert set(properties["properties"]) == set(entries["paper"])
 
@@ -141,3 +141,74 @@ def test_503_for_the_list_while_no_worker_can_read_it() -> None:
         assert (answer.status_code, answer.json()["code"]) == (503, "busy")
         assert subdivide(client, "model=paper").status_code == 503
         assert time.monotonic() - began < 10
+
+
+# In a worker
+
+
+@pytest.fixture
+def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Models]:
+    """The models of a worker, by what it is to serve, and on which providers."""
+    monkeypatch.setattr(model_file, "BUNDLED", folder)
+
+    def hold(*served: object) -> Models:
+        models = Models()
+        models.hold(*served)
+        return models
+
+    return hold
+
+
+def entries_of(models: Models) -> dict[tuple[str, bool], dict[str, object]]:
+    listed = json.loads(catalogue_of(models).content)
+    return {(entry["name"], entry["default"]): entry for entry in listed}
+
+
+def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(
+    serving: Callable[..., Models], tmp_path: Path
+) -> None:
+    mine, zero = served_file(tmp_path / "mine.onnx"), ZeroModel()
+    sources = (None, DEFAULT_MODEL), ("vertices", "vertices"), (mine, "mine"), (zero, "zero")
+    for source, name in sources:
+        models = serving(source)
+        assert models.get().name == name
+        assert models.get(name) is models.get()
+        assert models.get("paper").hash == load_model("paper").hash
+        assert [listed for listed, default in entries_of(models) if default] == [name]
+    # Without a file it has no size.
+    entry = entries_of(models)["zero", True]
+    assert entry.items() >= (asdict(zero.card) | {"size": None}).items()
+
+
+def test_a_bundled_name_wins_over_that_of_the_served_file(
+    serving: Callable[..., Models], tmp_path: Path
+) -> None:
+    models = serving(served_file(tmp_path / "paper.onnx"))
+    assert models.get("paper").hash == load_model("paper").hash != models.get().hash
+    listed = entries_of(models)
+    assert listed["paper", False]["hash"] == load_model("paper").hash
+    assert listed["paper", True]["hash"] == models.get().hash
+
+
+def test_a_served_file_that_does_not_load_has_a_name_and_no_entry(
+    serving: Callable[..., Models],
+) -> None:
+    missing = serving("missing.onnx")
+    assert not any(default for _, default in entries_of(missing))
+    assert "missing" in catalogue_of(missing).names
+
+
+def test_a_model_that_leaves_polygons_to_the_classic_rule_says_so_when_it_is_loaded(
+    serving: Callable[..., Models], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    catalogue_of(serving(None))
+    assert "companion" not in caplog.text
+    catalogue_of(serving(served_file(tmp_path / "mine.onnx")))
+    assert "model mine has no companion for polygons" in caplog.text
+
+
+def test_every_model_runs_on_the_providers_that_are_set(serving: Callable[..., Models]) -> None:
+    entries = entries_of(serving(None, ("CPUExecutionProvider",)))
+    assert all(entry["providers"] == ["CPUExecutionProvider"] for entry in entries.values())
+    with pytest.raises(NoModelError, match=r"SpareExecutionProvider.*CPUExecutionProvider"):
+        serving(None, ("SpareExecutionProvider",)).get()

@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import subprocess
-import time
 from pathlib import Path
 
 import httpx2
@@ -17,7 +16,7 @@ from service.settings import Settings
 from service.workers.jobs import subdivide
 from tests.support import node_tools
 from tests.support import stand_in_jobs as jobs
-from tests.support.live import local, served
+from tests.support.live import local, served, until
 
 ROOT = Path(__file__).resolve().parents[3]
 SUPPORT = ROOT / "tests" / "support"
@@ -34,8 +33,7 @@ def address():
     """A server that really refines."""
     with served(subdivide, warm_up=None, workers=1) as (host, port):
         url = f"http://{host}:{port}"
-        while httpx2.get(f"{url}/readyz").status_code != 200:
-            time.sleep(0.1)
+        until(lambda: httpx2.get(f"{url}/readyz").status_code == 200)
         yield url
 
 

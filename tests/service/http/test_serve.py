@@ -11,7 +11,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -22,14 +21,13 @@ import pytest
 
 from service.meshfiles.example import part_glb
 from tests.support.added_scheme import TRIANGLE, halved, with_linear
+from tests.support.live import HANGS, until
 from tests.support.packages import served_file
 
 PNS = Path(sys.executable).with_name("pns")
 ADDRESS = re.compile(r"running on http://([\d.]+):(\d+)")
 METRICS = re.compile(r"metrics on (http://\S+/metrics)")
 GO_ON = b"HTTP/1.1 100 Continue\r\n\r\n"
-# Only a server that does not end takes as long.
-HANGS = 300
 
 
 class Server:
@@ -66,18 +64,13 @@ class Server:
             answer = connection.getresponse()
             return answer.status, answer.read()
 
-    def status(self, path: str) -> int:
-        return self.get(path)[0]
-
     def wait_until_ready(self) -> None:
-        while self.status("/readyz") != 200:
-            time.sleep(0.05)
+        until(lambda: self.get("/readyz")[0] == 200)
 
     def wait_until_a_job_runs(self) -> None:
         told = METRICS.search(self.log)
         assert told is not None
-        while "pns_jobs_running 1.0" not in httpx2.get(told[1]).text:
-            time.sleep(0.01)
+        until(lambda: "pns_jobs_running 1.0" in httpx2.get(told[1]).text)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import socket
 import pytest
 
 from service.http.server import HEAD_BYTES
+from tests.support.live import received
 
 PATIENCE = 30
 NEXT = b"GET /limits HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
@@ -31,9 +32,7 @@ def answers(front, sent):
     """The status of each answer, and all that was said, until the server ends the connection."""
     with socket.create_connection(front, timeout=PATIENCE) as connection:
         connection.sendall(sent)
-        said = b""
-        while piece := connection.recv(2**16):
-            said += piece
+        said = received(connection)
     return [int(status) for status in re.findall(rb"HTTP/1\.1 (\d{3}) ", said)], said
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from email import message_from_bytes
 from email.message import Message
 from pathlib import Path
@@ -15,23 +14,16 @@ import httpx2
 import pytest
 
 from service.http import answer as answers
-from tests.support.live import served
+from tests.support.live import received, request_head, served, until
 
-GLB = {"Content-Type": "model/gltf-binary"}
 MIXED = "multipart/mixed"
-STREAM = GLB | {"Accept": MIXED}
+STREAM = {"Accept": MIXED}
 
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[tuple[str, int]]:
     with served(workers=2, queue=2, client_requests=3, job_seconds=3600) as where:
         yield where
-
-
-@pytest.fixture
-def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
-    with httpx2.Client(base_url=f"http://{address[0]}:{address[1]}", timeout=600) as opened:
-        yield opened
 
 
 def parts_of(answer: httpx2.Response) -> list[Message]:
@@ -52,19 +44,21 @@ def named(parts: list[Message], name: str) -> list[bytes]:
     ]
 
 
-def until(holds: Callable[[], bool]) -> None:
-    while not holds():
-        time.sleep(0.005)
+def views_of(answer: httpx2.Response) -> Iterator[dict[str, object]]:
+    """The progress of the job, as it is told."""
+    return (json.loads(line) for line in answer.iter_lines() if line.startswith("{"))
 
 
 def begin(address: tuple[str, int], body: bytes, accept: str = MIXED) -> socket.socket:
     connection = socket.create_connection(address, timeout=600)
-    head = (
-        "POST /subdivide HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/gltf-binary\r\n"
-        f"Accept: {accept}\r\nContent-Length: {len(body)}\r\n\r\n"
-    )
-    connection.sendall(head.encode() + body)
+    head = request_head(f"Accept: {accept}", f"Content-Length: {len(body)}")
+    connection.sendall(head + body)
     return connection
+
+
+def let_go(folder: Path) -> None:
+    for number in (1, 2, 3):
+        (folder / f"go-{number}").touch()
 
 
 def test_the_file_and_the_report_come_last(client: httpx2.Client) -> None:
@@ -102,10 +96,9 @@ def test_its_share_and_stage_are_told_as_it_goes_on(client: httpx2.Client, tmp_p
     seen: list[dict[str, object]] = []
     body = f"steps {tmp_path}".encode()
     with client.stream("POST", "/subdivide", content=body, headers=STREAM) as answer:
-        for line in answer.iter_lines():
-            if line.startswith("{"):
-                seen.append(json.loads(line))
-                (tmp_path / f"go-{round(4 * float(str(seen[-1]['share'])))}").touch()
+        for view in views_of(answer):
+            seen.append(view)
+            (tmp_path / f"go-{round(4 * float(str(view['share'])))}").touch()
     assert [view["share"] for view in seen if view["share"]] == [0.25, 0.5, 0.75]
     assert seen[-1] == {"state": "running", "place": None, "stage": "refine", "share": 0.75}
 
@@ -119,11 +112,10 @@ def test_a_stream_is_never_silent_for_long(
     same = 0
     body = f"steps {tmp_path}".encode()
     with client.stream("POST", "/subdivide", content=body, headers=STREAM) as answer:
-        for line in answer.iter_lines():
-            same += '"share":0.25' in line
+        for view in views_of(answer):
+            same += view["share"] == 0.25
             if same == 3:
-                for number in (1, 2, 3):
-                    (tmp_path / f"go-{number}").touch()
+                let_go(tmp_path)
     assert same >= 3
 
 
@@ -134,15 +126,9 @@ def test_one_that_waits_is_told_its_place(
     with begin(address, f"steps {tmp_path}".encode()):
         until((tmp_path / "took-1").exists)
         with client.stream("POST", "/subdivide", content=b"next", headers=STREAM) as answer:
-            first = next(line for line in answer.iter_lines() if line.startswith("{"))
-            assert json.loads(first) == {
-                "state": "queued",
-                "place": 0,
-                "stage": None,
-                "share": 0.0,
-            }
-            for number in (1, 2, 3):
-                (tmp_path / f"go-{number}").touch()
+            queued = {"state": "queued", "place": 0, "stage": None, "share": 0.0}
+            assert next(views_of(answer)) == queued
+            let_go(tmp_path)
 
 
 def test_429_for_more_than_a_client_may_have(
@@ -150,13 +136,13 @@ def test_429_for_more_than_a_client_may_have(
 ) -> None:
     held = [begin(address, f"steps {tmp_path}".encode()) for _ in range(3)]
     until((tmp_path / "took-1").exists)
-    until(lambda: client.post("/subdivide", content=b"x", headers=GLB).status_code == 429)
-    refused = client.post("/subdivide", content=b"x", headers=GLB)
+    until(lambda: client.post("/subdivide", content=b"x").status_code == 429)
+    refused = client.post("/subdivide", content=b"x")
     assert refused.json()["code"] == "too-many-requests"
     assert int(refused.headers["retry-after"]) >= 1
     for connection in held:
         connection.close()
-    until(lambda: client.post("/subdivide", content=b"x", headers=GLB).status_code == 200)
+    until(lambda: client.post("/subdivide", content=b"x").status_code == 200)
 
 
 @pytest.mark.parametrize("accept", [MIXED, "*/*"])
@@ -171,27 +157,19 @@ def test_who_leaves_frees_its_worker_and_memory(
         with begin(address, f"{word} {folder}".encode(), accept):
             if word == "steps":
                 until((folder / "took-1").exists)
-    until(lambda: client.post("/subdivide", content=b"here", headers=GLB).content == b"here")
+    until(lambda: client.post("/subdivide", content=b"here").content == b"here")
 
 
 def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """That is how a client knows that nothing more comes."""
-    got: list[bytes] = []
-    with served(workers=1, drain_seconds=1) as where:
+    with ThreadPoolExecutor(1) as reader, served(workers=1, drain_seconds=1) as where:
         connection = begin(where, f"steps {tmp_path}".encode())
         until((tmp_path / "took-1").exists)
-
-        def read() -> None:
-            while piece := connection.recv(4096):
-                got.append(piece)
-
-        reader = threading.Thread(target=read)
-        reader.start()
-    reader.join()
+        reading = reader.submit(received, connection)
+    said = reading.result()
     connection.close()
-    said = b"".join(got)
     boundary = said.partition(b"boundary=")[2].split(b"\r\n")[0]
     assert said.count(b"--" + boundary) >= 1
     assert b"--" + boundary + b"--" not in said

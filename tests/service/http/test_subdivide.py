@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import time
 import zipfile
 from collections.abc import Iterator
 from typing import Any
@@ -25,20 +24,16 @@ from service.meshfiles.glb import as_gltf_json
 from service.options import Limits, Options
 from service.settings import Settings
 from service.workers.jobs import hold_model
-from tests.support.live import local
+from tests.support.live import GLB, local, until
 from tests.support.stand_in_models import CountedModel
 
-GLB = {"Content-Type": "model/gltf-binary"}
 FACES = 1920
 
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
     with local(create_app(Settings(workers=1, faces=100_000))) as opened:
-        for _ in range(600):
-            if opened.get("/readyz").status_code == 200:
-                break
-            time.sleep(0.05)
+        until(lambda: opened.get("/readyz").status_code == 200)
         yield opened
 
 

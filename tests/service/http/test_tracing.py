@@ -7,10 +7,7 @@ import pytest
 from service.http import app as application
 from service.http.watch.tracing import HIDDEN, TracingError, provider_from_environment
 from service.settings import Settings
-from tests.support import stand_in_jobs as jobs
-from tests.support.live import local
-
-GLB = {"Content-Type": "model/gltf-binary"}
+from tests.support.live import obeying
 
 
 @pytest.fixture
@@ -23,8 +20,7 @@ def traced(monkeypatch):
     exporter, provider = InMemorySpanExporter(), trace.TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(exporter))
     monkeypatch.setattr(application, "provider_from_environment", lambda: provider)
-    app = application.create_app(Settings(workers=1), job=jobs.obey, warm_up=jobs.no_warm_up)
-    with local(app, raise_server_exceptions=False) as client:
+    with obeying() as client:
         yield client, exporter.get_finished_spans
 
 

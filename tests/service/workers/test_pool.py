@@ -84,14 +84,23 @@ async def test_errors_cross_the_process_boundary_and_the_worker_lives_on() -> No
         assert first != os.getpid()
 
 
-async def test_a_job_past_its_deadline_is_killed_even_while_it_holds_the_interpreter() -> None:
+@pytest.mark.parametrize("frozen", [False, True])
+async def test_a_job_past_its_deadline_is_killed_while_it_holds_the_interpreter_or_is_frozen(
+    frozen: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(CONSTS, "term_timeout", 0.1)
+
     async with workers(seconds=3) as pool:
         first = await do(pool, jobs.pid)
+        if frozen:
+            # It does not even say that it has begun.
+            os.kill(first, signal.SIGSTOP)
         with pytest.raises(JobTimeout):
             await do(pool, jobs.hold)
         # Its files are closed now, and another job may get their numbers.
         assert not alive(first)
         assert await do(pool, jobs.pid) != first
+        assert pool.restarts == {"job-timeout": 1}
 
 
 async def test_a_dying_worker_takes_only_its_own_job(tmp_path: Path) -> None:
@@ -103,14 +112,6 @@ async def test_a_dying_worker_takes_only_its_own_job(tmp_path: Path) -> None:
         (tmp_path / "go").touch()
         assert alive(await neighbour)
         assert await asyncio.gather(*(do(pool, jobs.sleep, 0.0) for _ in range(4)))
-
-
-async def test_a_worker_that_dies_idle_is_replaced() -> None:
-    async with workers() as pool:
-        first = await do(pool, jobs.pid)
-        os.kill(first, signal.SIGKILL)
-        await until(lambda: pool.restarts["idle"] == 1)
-        assert await do(pool, jobs.pid) != first
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
@@ -141,47 +142,27 @@ async def test_cancelling_a_job_that_waits_kills_nothing(tmp_path: Path) -> None
 
 async def test_a_warm_up_may_take_longer_than_a_job() -> None:
     async with workers(seconds=0.3, warm_up=partial(jobs.sleep, 1.0)) as pool:
-        while not pool.ready:
-            await asyncio.sleep(0.1)
+        await until(lambda: pool.ready)
         with pytest.raises(JobTimeout):
             await do(pool, jobs.sleep, 5.0)
 
 
-async def test_a_frozen_worker_hangs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CONSTS, "term_timeout", 0.1)
-
-    async with workers(seconds=3) as pool:
-        first = await do(pool, jobs.pid)
-        os.kill(first, signal.SIGSTOP)
-        # It does not even say that it has begun.
-        with pytest.raises(JobTimeout):
-            await do(pool, jobs.pid)
-        assert await do(pool, jobs.pid) != first
-        assert pool.restarts == {"job-timeout": 1}
-
-
-async def test_a_job_that_looks_ends_itself_and_its_worker_lives_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("looks", [True, False])
+async def test_a_cancelled_job_ends_itself_where_it_looks_and_is_killed_where_not(
+    looks: bool, tmp_path: Path
+) -> None:
+    begun = tmp_path / "took-1"
     async with workers() as pool:
         first = await do(pool, jobs.pid)
-        job = asyncio.create_task(do(pool, jobs.take_steps, tmp_path))
-        await until((tmp_path / "took-1").exists)
+        steps, holds = (jobs.take_steps, tmp_path), (jobs.begin_to_hold, begun)
+        job = asyncio.create_task(do(pool, *(steps if looks else holds)))
+        await until(begun.exists)
         job.cancel()
         with pytest.raises(asyncio.CancelledError):
             await job
-        assert await do(pool, jobs.pid) == first
-        assert pool.restarts == {}
-
-
-async def test_a_job_that_does_not_look_is_killed(tmp_path: Path) -> None:
-    async with workers() as pool:
-        first = await do(pool, jobs.pid)
-        job = asyncio.create_task(do(pool, jobs.begin_to_hold, tmp_path / "begun"))
-        await until((tmp_path / "begun").exists)
-        job.cancel()
-        await asyncio.gather(job, return_exceptions=True)
-        assert not alive(first)
-        assert await do(pool, jobs.pid) != first
-        assert pool.restarts == {"stopped": 1}
+        assert alive(first) is looks
+        assert (await do(pool, jobs.pid) == first) is looks
+        assert pool.restarts == ({} if looks else {"stopped": 1})
 
 
 async def test_stop_ends_running_jobs(tmp_path: Path) -> None:
@@ -204,6 +185,7 @@ async def test_ready_while_a_worker_that_has_warmed_up_lives(tmp_path: Path) -> 
         model.unlink()
         os.kill(first, signal.SIGKILL)
         await until(lambda: not pool.ready)
+        await until(lambda: pool.restarts["idle"] == 1)
         # The next one lives, but has no model.
         assert await do(pool, jobs.pid) != first
         assert not pool.ready
@@ -214,11 +196,9 @@ async def test_a_worker_whose_warm_up_fails_is_tried_again(tmp_path: Path) -> No
     kernels = tmp_path / "kernels"
 
     async with workers(warm_up=partial(os.stat, kernels)) as pool:
-        while not pool.restarts["start"]:
-            await asyncio.sleep(0.05)
+        await until(lambda: pool.restarts["start"] > 0)
         kernels.touch()
-        while not pool.ready:
-            await asyncio.sleep(0.05)
+        await until(lambda: pool.ready)
 
 
 @pytest.mark.parametrize("what", ["channels", "launch_process"])

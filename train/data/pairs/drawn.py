@@ -7,9 +7,10 @@ sharp; with fewer sides they are meant as they are.
 import numpy as np
 from jaxtyping import Float
 
+from pns_common import Mesh
 from train.data.pairs.faceted import sampled
-from train.data.pairs.lathe import FINE, FINE_SHARP, ROUND, Plan, centred, raised, random_lid
-from train.data.pairs.references import Pair, sharp_edges
+from train.data.pairs.lathe import FINE, ROUND, centred, polygon, raised, random_lid
+from train.data.pairs.references import Pair
 from train.surfaces.solids import random_rotation
 
 FEWEST_SIDES, MOST_SIDES = 3, 33
@@ -22,25 +23,17 @@ def drawn_pair(rng: np.random.Generator) -> Pair:
     """Return a cone, a spindle or a drum, turned at random in space."""
     sides = int(np.exp(rng.uniform(*np.log((FEWEST_SIDES, MOST_SIDES)))))
     outline = OUTLINES[int(rng.integers(len(OUTLINES)))](rng)
-    plan = circle(sides)
+    plan = polygon(sides)
     coarse = raised(outline, plan, (random_lid(plan, rng), random_lid(plan, rng)))
     if sides < ROUND:
         fine = coarse
     else:
         # Corners of the coarse mesh are corners of the fine one.
         count = sides * -(-FINE // sides)
-        fine = raised(outline, circle(count), (centred(count), centred(count)))
+        fine = raised(outline, polygon(count), (centred(count), centred(count)))
     turn = random_rotation(rng)
     surface = sampled(fine.vertices @ turn, fine.faces, rng)
-    turned = type(coarse)(coarse.vertices @ turn, coarse.faces)
-    whole = type(fine)(fine.vertices @ turn, fine.faces)
-    return Pair("drawn", turned, surface, sharp_edges(whole, FINE_SHARP))
-
-
-def circle(sides: int) -> Plan:
-    """Return the corners of a regular polygon, anticlockwise."""
-    angle = 2 * np.pi * np.arange(sides) / sides
-    return np.c_[np.cos(angle), np.sin(angle)]
+    return Pair("drawn", Mesh(coarse.vertices @ turn, coarse.faces), surface)
 
 
 def _height(rng: np.random.Generator) -> float:

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold, largest_part
-from train.data.pairs.references import Pair, Reference, coarsened, sharp_edges
+from train.data.pairs.references import Pair, Reference, coarsened
 
 # Of the split polyhedron that is then simplified.
 FEWEST_FACES, MOST_FACES = 1500, 8000
@@ -40,9 +40,8 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     if made is None:
         return None
     points, faces = made
-    sharp = sharp_edges(Mesh(points, faces))
     if rng.random() < AS_DRAWN:
-        return Pair("faceted", Mesh(points, faces), sampled(points, faces, rng), sharp)
+        return Pair("faceted", Mesh(points, faces), sampled(points, faces, rng))
     dense, triangles = points, faces
     while len(triangles) < FEWEST_FACES:
         level = connect(triangles, len(dense))
@@ -56,7 +55,7 @@ def faceted_pair(rng: np.random.Generator) -> Pair | None:
     coarse = coarsened(dense + noise, triangles, min(count, len(triangles) // 2), rng)
     if coarse is None:
         return None
-    return Pair("faceted", coarse, sampled(points, faces, rng), sharp)
+    return Pair("faceted", coarse, sampled(points, faces, rng))
 
 
 def polyhedron(

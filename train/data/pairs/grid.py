@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common import Mesh
-from train.data.pairs.references import SMOOTH, Pair, Reference
+from train.data.pairs.references import Pair, Reference
 from train.surfaces.solids import random_rotation
 
 # u, v in [0, 1] to points; v goes round.
@@ -37,7 +37,7 @@ def grid_pair(rng: np.random.Generator) -> Pair:
     fine = grid_mesh(point_at, kind, down, along, np.zeros(down * along, dtype=bool))
     turn = random_rotation(rng)
     surface = Reference(fine.vertices @ turn, vertex_normals(fine) @ turn)
-    return Pair("grid", Mesh(coarse.vertices @ turn, coarse.faces), surface, SMOOTH)
+    return Pair("grid", Mesh(coarse.vertices @ turn, coarse.faces), surface)
 
 
 def random_cut(rows: int, columns: int, rng: np.random.Generator) -> Bool[np.ndarray, " Q"]:

@@ -16,7 +16,7 @@ from train.data.batch import joined_meshes
 from train.data.pairs.faceted import polyhedron, sampled
 from train.data.pairs.grid import cut_quads, random_cut
 from train.data.pairs.outlines import CURVED, OUTLINES, Outline, smoothed, wheel
-from train.data.pairs.references import Pair, sharp_edges
+from train.data.pairs.references import Pair
 from train.surfaces.solids import random_rotation
 
 # Corners of a plan, anticlockwise round the origin.
@@ -28,9 +28,6 @@ Lid = Int[np.ndarray, "T 3"]
 # Sides from which on a part is round, and of the mesh that stands for it.
 ROUND, FINE = 7, 180
 FEWEST_SIDES, MOST_SIDES = 3, 36
-
-# Edges of the fine mesh that turn by more are sharp, radians.
-FINE_SHARP = np.radians(20)
 
 # Steps of a slice, as often as they stand here.
 STEPS = (2, 2, 3, 3, 4, 5, 6)
@@ -57,7 +54,7 @@ def lathe_pair(rng: np.random.Generator) -> Pair:
             parts.append(Mesh(scale * mesh.vertices @ turn + shift, mesh.faces))
     whole = joined_meshes(fine)
     surface = sampled(whole.vertices, whole.faces, rng)
-    return Pair("lathe", joined_meshes(coarse), surface, sharp_edges(whole, FINE_SHARP))
+    return Pair("lathe", joined_meshes(coarse), surface)
 
 
 def _as_drawn(rng: np.random.Generator) -> tuple[Mesh, Mesh]:

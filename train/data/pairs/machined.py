@@ -1,4 +1,4 @@
-"""Exact parts of OpenCascade, tessellated and simplified, with their true sharp edges."""
+"""Exact parts of OpenCascade, tessellated and simplified."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ import numpy as np
 from pns_common import Mesh
 from train.connectivity import connect
 from train.data.dense_meshes import is_manifold
-from train.data.pairs.references import LEAST_SHARP, Coarsen, Pair, Reference, coarsened
+from train.data.pairs.references import Coarsen, Pair, Reference, coarsened
 from train.surfaces.brep import Tessellation, tessellated
 from train.surfaces.machined import machined_part
 from train.surfaces.solids import random_rotation
-from train.vectors import angle, norm, unit
+from train.vectors import norm, unit
 
 # Chords' deflection, over a part's size about; angles between them, as printers' files have them.
 DEFLECTION, ANGLES = 0.004, (0.12, 0.35)
@@ -39,32 +39,20 @@ def machined_pairs(rng: np.random.Generator, coarsen: Coarsen = coarsened) -> It
     if not is_manifold(dense) or len(dense.faces) > MOST_DENSE:
         return
     turn = random_rotation(rng)
-    surface, sharp = _sampled(part, rng), true_edges(part) @ turn
+    surface = _sampled(part, rng)
     surface = Reference(surface.points @ turn, surface.normals @ turn)
     if rng.random() < SPLIT:
         dense = _split(dense, float(rng.uniform(*LONGEST)))
     drawn = tessellated(shape, 1.0, rng.uniform(*DRAWN_ANGLES))
     coarse = Mesh(drawn.vertices @ turn, drawn.faces)
     if len(coarse.faces) <= MOST and is_manifold(coarse):
-        yield Pair("machined", coarse, surface, sharp)
+        yield Pair("machined", coarse, surface)
     most = min(MOST, len(dense.faces) // 2)
     for _ in range(EACH if most > FEWEST else 0):
         count = int(np.exp(rng.uniform(np.log(FEWEST), np.log(most))))
         coarse = coarsen(dense.vertices @ turn, dense.faces, count, rng)
         if coarse is not None:
-            yield Pair("machined", coarse, surface, sharp)
-
-
-def true_edges(part: Tessellation) -> np.ndarray:
-    """Return edges between faces of the solid whose exact normals differ, as segments."""
-    level = connect(part.faces, len(part.vertices))
-    here, there = level.half_edges[level.paired].numpy().T
-    face, other = here // 3, there // 3
-    # A half-edge starts at corner i; its twin's end is the same vertex.
-    start = angle(part.normals[face, here % 3], part.normals[other, (there + 1) % 3])
-    end = angle(part.normals[face, (here + 1) % 3], part.normals[other, there % 3])
-    sharp = (part.patch[face] != part.patch[other]) & (np.maximum(start, end) > LEAST_SHARP)
-    return part.vertices[level.edges[level.paired].numpy()[sharp]]
+            yield Pair("machined", coarse, surface)
 
 
 def _sampled(part: Tessellation, rng: np.random.Generator) -> Reference:

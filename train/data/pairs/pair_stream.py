@@ -5,7 +5,6 @@ solids of plane faces, parts drawn with few faces, and machined ones.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -21,17 +20,15 @@ Single = Callable[[np.random.Generator], Pair | None]
 Several = Callable[[np.random.Generator], Iterator[Pair]]
 
 # How often each draws a pair, in the order that a seed means.
-SHARES: Mapping[Single, float] = MappingProxyType(
-    {
-        patch_pair: 0.12,
-        grid_pair: 0.05,
-        sphere_pair: 0.04,
-        faceted_pair: 0.05,
-        lathe_pair: 0.26,
-    }
-)
+SHARES: Mapping[Single, float] = {
+    patch_pair: 0.12,
+    grid_pair: 0.05,
+    sphere_pair: 0.04,
+    faceted_pair: 0.05,
+    lathe_pair: 0.26,
+}
 # Makers of several pairs of one shape, which are drawn one by one.
-SHARED: Mapping[Several, float] = MappingProxyType({machined_pairs: 0.14, solid_pairs: 0.34})
+SHARED: Mapping[Several, float] = {machined_pairs: 0.14, solid_pairs: 0.34}
 
 MOST_FACES = 1200
 

@@ -7,7 +7,6 @@ flat parts of them in n-gons, as modellers draw.
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -23,14 +22,7 @@ from train.data.pairs.grid import grid_pair, vertex_normals
 from train.data.pairs.lathe import lathe_pair
 from train.data.pairs.machined import machined_pairs
 from train.data.pairs.pair_stream import drawn_pairs
-from train.data.pairs.references import (
-    SMOOTH,
-    Pair,
-    Reference,
-    coarsened,
-    patch_pair,
-    sphere_pair,
-)
+from train.data.pairs.references import Pair, Reference, coarsened, patch_pair, sphere_pair
 from train.data.pairs.solid import solid_pairs
 from train.data.remeshers import instant, laid_onto, with_points
 from train.data.simplifiers import Simplifier, isotropic
@@ -76,7 +68,7 @@ def polygon_stream(seed: int) -> Iterator[Pair]:
     for pair in drawn_pairs(rng, singles, several):
         mesh = in_polygons(pair.coarse, rng)
         if FEWEST <= mesh.face_count <= MOST and is_manifold(mesh):
-            yield Pair(pair.kind, mesh, pair.surface, pair.sharp)
+            yield Pair(pair.kind, mesh, pair.surface)
 
 
 def remeshed(
@@ -117,7 +109,7 @@ def cage_pair(rng: np.random.Generator) -> Pair | None:
     cage, scheme = with_points(cage, cage.vertices + noise), catmull_clark()
     coarse = refine(cage, scheme, int(rng.choice(SPLITS)), limit=True).mesh
     fine = refine(cage, scheme, FINE_SPLITS, limit=True).mesh.triangulated()
-    return Pair("cage", coarse, Reference(fine.vertices, vertex_normals(fine)), SMOOTH)
+    return Pair("cage", coarse, Reference(fine.vertices, vertex_normals(fine)))
 
 
 def in_polygons(mesh: Mesh, rng: np.random.Generator) -> Mesh:
@@ -159,7 +151,7 @@ def joined(mesh: Mesh, faces: int) -> Mesh:
     return laid_onto(mesh, in_polygons(triangles, np.random.default_rng(faces)))
 
 
-REMESHERS: Mapping[str, Simplifier] = MappingProxyType({"instant": instant, "joined": joined})
+REMESHERS: Mapping[str, Simplifier] = {"instant": instant, "joined": joined}
 
 
 def _flat_parts(mesh: Mesh) -> tuple[list[np.ndarray], np.ndarray]:

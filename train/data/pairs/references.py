@@ -6,16 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pns_common import Mesh, MeshError, loop
-from train.connectivity import connect
+from pns_common import Mesh, MeshError, loop, refine
 from train.data.dense_meshes import is_manifold
-from train.data.primitives import icosphere
+from train.data.icosphere import icosphere
 from train.data.remeshers import with_points
 from train.data.simplifiers import SIMPLIFIERS, fast_quadric
-from train.data.stream import random_instance
-from train.refining import refine
+from train.data.stream import random_patch
 from train.surfaces.implicit import unit_normal
-from train.vectors import angle, face_normals
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,46 +23,17 @@ class Reference:
     normals: Float[np.ndarray, "P 3"]
 
 
-# Ends of pieces of sharp edges.
-Segments = Float[np.ndarray, "S 2 3"]
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Pair:
-    """A coarse mesh and its surface.
-
-    Attributes:
-        kind: where it comes from.
-        sharp: the surface's own sharp edges; None where they are not known.
-    """
+    """A coarse mesh and its surface; the kind says where it comes from."""
 
     kind: str
     coarse: Mesh
     surface: Reference
-    sharp: Segments | None = None
 
 
 # Dense vertices and faces, and a number of faces, to a coarse mesh; None where it is spoilt.
 Coarsen = Callable[[np.ndarray, np.ndarray, int, np.random.Generator], Mesh | None]
-
-# An edge of a surface that turns by more is sharp, radians.
-LEAST_SHARP = np.radians(15)
-
-# A surface without sharp edges.
-SMOOTH: Segments = np.zeros((0, 2, 3))
-
-
-def turns(mesh: Mesh, beside: Int[np.ndarray, "E 2"]) -> Float[np.ndarray, " E"]:
-    """Return the angles between pairs of faces, radians."""
-    normals = face_normals(mesh.vertices, mesh.faces)
-    return angle(normals[beside[:, 0]], normals[beside[:, 1]])
-
-
-def sharp_edges(mesh: Mesh, least: float = LEAST_SHARP) -> Segments:
-    """Return the interior edges of a mesh that turn by more than an angle, radians."""
-    level = connect(mesh.faces, len(mesh.vertices))
-    sharp = level.paired.numpy() & (turns(mesh, level.half_edges.numpy() // 3) > least)
-    return mesh.vertices[level.edges.numpy()[sharp]]
 
 
 def moved(pair: Pair, linear: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, " 3"]) -> Pair:
@@ -75,7 +43,6 @@ def moved(pair: Pair, linear: Float[np.ndarray, "3 3"], shift: Float[np.ndarray,
         pair.kind,
         with_points(pair.coarse, pair.coarse.vertices @ linear + shift),
         Reference(pair.surface.points @ linear + shift, pair.surface.normals @ turn),
-        None if pair.sharp is None else pair.sharp @ linear + shift,
     )
 
 
@@ -104,13 +71,13 @@ def sphere_pair(rng: np.random.Generator, coarsen: Coarsen | None = None) -> Pai
             coarse = with_points(coarse, unit * axes)
     if coarse is None:
         return None
-    return Pair("sphere", coarse, _ellipsoid(dense, axes), SMOOTH)
+    return Pair("sphere", coarse, _ellipsoid(dense, axes))
 
 
 def ball_pair(rng: np.random.Generator) -> Pair:
     """Return an icosahedron, or one split once, and the sphere through its corners."""
     coarse = icosphere(int(rng.integers(2)))
-    return Pair("ball", coarse, _ellipsoid(icosphere(DENSE_SPLITS), np.ones(3)), SMOOTH)
+    return Pair("ball", coarse, _ellipsoid(icosphere(DENSE_SPLITS), np.ones(3)))
 
 
 def _ellipsoid(sphere: Mesh, axes: Float[np.ndarray, " 3"]) -> Reference:
@@ -124,14 +91,13 @@ LEVELS, PROJECTIONS = 3, 4
 
 def patch_pair(rng: np.random.Generator) -> Pair:
     """Return a patch of `train.data.stream`, its surface by Loop's mesh laid onto it."""
-    instance = random_instance(rng)
-    surface = instance.surface
-    points = refine(instance.mesh, loop(), LEVELS, 1.0).mesh.vertices
+    surface, coarse = random_patch(rng)
+    points = refine(coarse, loop(), LEVELS, limit=False, threads=1).mesh.vertices
     for _ in range(PROJECTIONS):
         slope = surface.gradient(points)
         points = points - (surface.value(points) / (slope**2).sum(axis=1))[:, None] * slope
     reference = Reference(points, unit_normal(surface, points))
-    return Pair("patch", instance.mesh, reference, SMOOTH)
+    return Pair("patch", coarse, reference)
 
 
 # How often each of `train.data.simplifiers`. Quadrics leave vertices outside of round surfaces, the

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from train.experiments.harness.experiment import column
@@ -11,7 +10,7 @@ from train.metrics.one_step import METRIC_TITLES, METRICS, Improvement
 # Per cent of improvement below which no share of the limit is given.
 SMALLEST_LIMIT = 0.1
 
-NOTHING: Mapping[str, Any] = MappingProxyType({})
+NOTHING: Mapping[str, Any] = {}
 
 LIMIT_NOTE = (
     "*Limit* is the best that any network could do with the same C and c: the distance minimised "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from matplotlib.figure import Figure as Drawing
@@ -65,12 +64,10 @@ class Experiment:
     Attributes:
         name: on the command line.
         title: on the page.
-        source: where the paper has it, or that it goes beyond the paper.
+        source: where the paper has it.
         run: does the work; at `SMALL` scale it takes a few seconds.
         seconds: about how long it takes at full scale, for the estimate.
         needs_published: cannot run without the author's published data.
-        needs_assets: cannot run without a folder of meshes.
-        reads: the files that it reads beside code, checkpoints and published data.
     """
 
     name: str
@@ -79,8 +76,6 @@ class Experiment:
     run: Callable[[Laboratory], Outcome]
     seconds: float
     needs_published: bool = False
-    needs_assets: bool = False
-    reads: Callable[[Laboratory], Iterable[Path]] = lambda _: ()
 
 
 if TYPE_CHECKING:

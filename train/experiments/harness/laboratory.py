@@ -1,29 +1,32 @@
-"""The laboratory of experiments: their scale, the data sets, trained networks, progress."""
+"""The laboratory of experiments: their scale, the data sets, trained networks."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import msgspec
 
-from pns_common import pns
+from pns_common import Scheme, pns
 from train.data.datasets import DATASETS, Dataset
-from train.experiments.harness.sources import code_of, sources_of
 from train.experiments.harness.variants import PNS, Variant, fit_variant
 from train.fitting.determinism import machine_fingerprint
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.networks import BoundedNet
 from train.models.recipe import Recipe
 from train.models.torch_model import recipe_model
-from train.refining import AnyScheme
 
-# Called with what is being done, how many steps of it are done, and of how many.
-OnProgress = Callable[[str, int, int], None]
+ROOT = Path(__file__).resolve().parents[3]
 
 
-def silent(_text: str, _done: int, _of: int) -> None:
-    """Tell nobody."""
+@cache
+def code() -> bytes:
+    """Return a hash of all code that a result may depend on."""
+    digest = hashlib.sha256()
+    for package in ("pns_common", "train"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.digest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,6 @@ class Scale:
             data set two at least, as intervals need them.
         training_steps: at most.
         levels: of repeated subdivision.
-        deepest: level of the extended iteration.
         samples: random draws where an experiment takes any.
     """
 
@@ -44,13 +46,12 @@ class Scale:
     instances: int
     training_steps: int
     levels: int
-    deepest: int
     samples: int
 
 
-FULL = Scale("full", instances=1000, training_steps=100_000, levels=4, deepest=7, samples=1000)
+FULL = Scale("full", instances=1000, training_steps=100_000, levels=4, samples=1000)
 # A few seconds each, for the tests: every line runs, no number means anything.
-SMALL = Scale("small", instances=1, training_steps=2, levels=2, deepest=2, samples=10)
+SMALL = Scale("small", instances=1, training_steps=2, levels=2, samples=10)
 
 
 @dataclass(frozen=True)
@@ -62,23 +63,19 @@ class Laboratory:
             is trained.
         cache: folder where trained networks are kept between runs.
         published: folder of the author's published data, or None.
-        progress: called while something takes long.
-        assets: folder of dense meshes, or None.
     """
 
     scale: Scale
     cache: Path
     checkpoints: Path | None
     published: Path | None
-    progress: OnProgress
-    assets: Path | None = None
 
     def dataset(self, name: str) -> Dataset:
         """Return a data set, cut to the scale."""
         dataset = DATASETS[name]()
         return Dataset(dataset.name, dataset.instances[: max(2, self.scale.instances)])
 
-    def scheme(self, recipe: Recipe) -> AnyScheme:
+    def scheme(self, recipe: Recipe) -> Scheme:
         """Return PNS with the network of a recipe."""
         return pns(recipe_model(recipe, self.network(recipe)), recipe.budget)
 
@@ -92,17 +89,12 @@ class Laboratory:
         kept = self.cache / f"{recipe.name}-{_digest(recipe, variant)}.safetensors"
         if kept.is_file():
             return load_checkpoint(kept).network
-
-        def on_step(done: int, _: float) -> None:
-            self.progress(f"training {recipe.name}", done, recipe.steps)
-
-        fitted = fit_variant(variant, recipe, on_step)
+        fitted = fit_variant(variant, recipe)
         save_checkpoint(kept, Checkpoint(recipe, fitted.network, {}, machine_fingerprint()))
         return fitted.network
 
 
 def _digest(recipe: Recipe, variant: Variant) -> str:
     """Return a short hash of what decides the weights: the recipe, the rule, the code."""
-    parts = [msgspec.json.encode(recipe), variant.name.encode()]
-    parts += [code_of(path) for path in sources_of("train.experiments.harness.variants")]
+    parts = [msgspec.json.encode(recipe), variant.name.encode(), code()]
     return hashlib.sha256(b"\n".join(parts)).hexdigest()[:12]

@@ -13,9 +13,9 @@ from train.experiments.harness.reproduce import Record, formatted
 INTRODUCTION = """\
 # Results
 
-Made by `python train/run.py reproduce --published DIR --assets DIR`; every number under our own
-headings was computed by that command. The author's published data and the folder of meshes are not
-kept with the source; without them some sections have fewer meshes, and others are left out.
+Made by `python train/run.py reproduce --published DIR`; every number under our own headings was
+computed by that command. The author's published data are not kept with the source; without them the
+last section is left out. What the default model reaches stands on [its page](validation.md).
 Columns headed *Paper* are printed in the paper, columns headed *Published* in the files of its
 author's repository; they stand there for comparison and are no measurement of ours.
 Improvements are relative to Loop, in per cent: the mean over 2000 paired bootstrap resamples.

@@ -5,21 +5,20 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import msgspec
 
 from pns_common.files import replacing
 from train.experiments.harness.experiment import Cell, Column, Experiment, Figure, Table
-from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.sources import code_of, sources_of
+from train.experiments.harness.laboratory import Laboratory, code
 from train.experiments.harness.style import shared_style
 from train.fitting.determinism import deterministic
 
 # What each figure is written as, without what would be another in each run.
-FORMATS: Mapping[str, Mapping[str, None]] = MappingProxyType(
-    {"png": {"Software": None}, "pdf": {"CreationDate": None}}
-)
+FORMATS: Mapping[str, Mapping[str, None]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +78,15 @@ def read_record(path: Path) -> Record | None:
 
 
 def content_key(experiment: Experiment, laboratory: Laboratory) -> str:
-    """Return a hash of an experiment's inputs: code, scale, checkpoints and all files it reads."""
-    inputs = list(experiment.reads(laboratory))
+    """Return a hash of an experiment's inputs: code, scale, checkpoints, published data."""
+    inputs: list[Path] = []
     if laboratory.checkpoints is not None:
         inputs += laboratory.checkpoints.glob("*.safetensors")
     if experiment.needs_published and laboratory.published is not None:
         inputs += (path for path in laboratory.published.rglob("*") if path.is_file())
-    digest = hashlib.sha256(msgspec.json.encode(laboratory.scale))
-    contents = [(path, code_of(path)) for path in sources_of(experiment.run.__module__)]
-    contents += [(path, path.read_bytes()) for path in sorted(inputs)]
-    for path, content in contents:
-        digest.update(path.name.encode())
-        digest.update(content)
+    digest = hashlib.sha256(msgspec.json.encode(laboratory.scale) + code())
+    for path in sorted(inputs):
+        digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

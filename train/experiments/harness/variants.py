@@ -6,16 +6,16 @@ Structural certification and ablation.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import msgspec
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from pns_common import Scheme
 from train.connectivity import Connectivity
 from train.data.batch import Batch
-from train.fitting.trainer import Fit, OnStep, optimise, step_loss, with_quiet
+from train.fitting.trainer import Fit, optimise, step_loss, with_quiet
 from train.models.networks import RAW_COORDINATES, BoundedNet, unit_correction
 from train.models.recipe import Recipe, one_step
 from train.reference import (
@@ -28,7 +28,7 @@ from train.reference import (
     paper_5,
     read_edges,
 )
-from train.refining import Method
+from train.refining import torch_rule
 from train.tensors import shortened
 
 
@@ -117,12 +117,10 @@ WITHOUT_GATE = Variant("no-gate", "paper-5", without_gate, gated=False)
 WITHOUT_BOUND = Variant("unbounded", "paper-5", without_bound)
 UNCONSTRAINED = Variant("unconstrained", RAW_COORDINATES, unconstrained, gated=False)
 
-VARIANTS: Mapping[str, Variant] = MappingProxyType(
-    {
-        variant.name: variant
-        for variant in (PNS, WITHOUT_SQUARE, WITHOUT_GATE, WITHOUT_BOUND, UNCONSTRAINED)
-    }
-)
+VARIANTS: Mapping[str, Variant] = {
+    variant.name: variant
+    for variant in (PNS, WITHOUT_SQUARE, WITHOUT_GATE, WITHOUT_BOUND, UNCONSTRAINED)
+}
 
 
 def variant_recipe(recipe: Recipe, variant: Variant) -> Recipe:
@@ -158,23 +156,23 @@ def variant_step(
     return on_edges(points, mesh, made, seen.envelope, gate)
 
 
-def fit_variant(variant: Variant, recipe: Recipe, on_step: OnStep) -> Fit:
+def fit_variant(variant: Variant, recipe: Recipe) -> Fit:
     """Train a variant by a recipe of its own."""
 
     def loss(network: BoundedNet, batch: Batch) -> Float[Tensor, ""]:
         step = variant_step(variant, network, recipe, batch.points, batch.mesh)
         return step_loss(recipe, batch, step)
 
-    return optimise(recipe, with_quiet(recipe, loss), on_step)
+    return optimise(recipe, with_quiet(recipe, loss), lambda done, loss: None)
 
 
-def variant_method(variant: Variant, network: BoundedNet, recipe: Recipe) -> Method:
-    """Return a variant as a method; ratios are against its C h²."""
+def variant_scheme(variant: Variant, network: BoundedNet, recipe: Recipe) -> Scheme:
+    """Return a variant as a scheme; ratios are against its C h²."""
 
     def step(points: Float[Tensor, "V 3"], mesh: Connectivity, reference_length: float) -> Step:
         return variant_step(variant, network, recipe, points, mesh, reference_length)
 
-    return Method(variant.name, step)
+    return Scheme(variant.name, rule=torch_rule(step), learned_levels=None)
 
 
 def _bounded(seen: Seen, network: BoundedNet) -> Float[Tensor, "I 3"]:

@@ -1,36 +1,34 @@
 """The ablation table: one part of the operator taken out at a time."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
-from pns_common import Mesh, pns
+from pns_common import Mesh, Scheme, loop, pns
 from train.data.datasets import Dataset, grid_faces, jittered_grid
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.variants import VARIANTS, variant_method, variant_recipe
+from train.experiments.harness.variants import VARIANTS, variant_recipe, variant_scheme
 from train.experiments.paper.methods import PAPER_UNITS, largest_ratio, level_by_level
 from train.experiments.paper.paper_values import PUBLISHED_ABLATION
 from train.metrics.card import compare_with_loop
 from train.models.from_recipe import initial_network
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
-from train.refining import AnyScheme, loop_like, refine
+from train.refining import figures, refine
 
 LEVEL = 3
-REMOVED_TITLES: Mapping[str, str] = MappingProxyType(
-    {
-        "no-h2": "no h² (one power of h)",
-        "no-gate": "no gate",
-        "unbounded": "unbounded output",
-        "unconstrained": "unconstrained MLP",
-    }
-)
-TITLES: Mapping[str, str] = MappingProxyType(
-    {"pns": "PNS (full, trained)", "random": "PNS with random θ", **REMOVED_TITLES}
-)
+REMOVED_TITLES = {
+    "no-h2": "no h² (one power of h)",
+    "no-gate": "no gate",
+    "unbounded": "unbounded output",
+    "unconstrained": "unconstrained MLP",
+}
+TITLES = {
+    "pns": "PNS (full, trained)",
+    "random": "PNS with random θ",
+    **REMOVED_TITLES,
+}
 NOTES = (
     "One-step ratio: the largest over all held-out ridges. Three steps: the largest of the levels "
     "on the first held-out ridge, with the largest normal jump of level 3. The published weights "
@@ -73,10 +71,10 @@ class Architecture:
     jump: float
 
 
-def architecture_numbers(scheme: AnyScheme, held_out: Dataset, levels: int) -> Architecture:
+def architecture_numbers(scheme: Scheme, held_out: Dataset, levels: int) -> Architecture:
     """Return what an operator's parts protect, of one step and of `levels`."""
     reports = [
-        refinement.levels[0]
+        figures(refinement)[0]
         for refinement in level_by_level(held_out.instances[0].mesh, scheme, levels)
     ]
     return Architecture(
@@ -87,12 +85,12 @@ def architecture_numbers(scheme: AnyScheme, held_out: Dataset, levels: int) -> A
     )
 
 
-def affine_error(scheme: AnyScheme) -> float:
+def affine_error(scheme: Scheme) -> float:
     """Return the largest departure from Loop on a planar, tilted, jittered patch."""
     x, y = jittered_grid(seed=0, jitter=0.4).double().numpy().T
     mesh = Mesh(np.stack([x, y, 0.3 * x - 0.2 * y], axis=1), grid_faces())
     positions = refine(mesh, scheme, reference_length=PAPER_UNITS).mesh.vertices
-    expected = refine(mesh, loop_like(scheme), reference_length=PAPER_UNITS).mesh.vertices
+    expected = refine(mesh, loop(), reference_length=PAPER_UNITS).mesh.vertices
     return float(np.linalg.norm(positions - expected, axis=1).max())
 
 
@@ -105,13 +103,13 @@ def run(laboratory: Laboratory) -> Outcome:
         if name not in schemes:
             variant = VARIANTS[name]
             own = variant_recipe(recipe, variant)
-            schemes[name] = variant_method(variant, laboratory.network(own, variant), own)
+            schemes[name] = variant_scheme(variant, laboratory.network(own, variant), own)
     levels = min(LEVEL, laboratory.scale.levels)
     rows = [_row(name, schemes[name], held_out, levels) for name in TITLES]
     return Outcome((table("ablation", "What each part protects", Row, rows),), notes=NOTES)
 
 
-def _row(name: str, scheme: AnyScheme, held_out: Dataset, levels: int) -> Row:
+def _row(name: str, scheme: Scheme, held_out: Dataset, levels: int) -> Row:
     ours = architecture_numbers(scheme, held_out, levels)
     one_step, affine, last, jump, near = PUBLISHED_ABLATION.get(name, (None,) * 5)
     return Row(

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure as Drawing
 
+from pns_common import Scheme
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE
 from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
@@ -13,7 +14,6 @@ from train.experiments.paper.methods import largest_ratio, paper_with_budget
 from train.experiments.paper.paper_values import PUBLISHED_C_SWEEP
 from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
-from train.refining import AnyScheme
 
 BUDGETS = (0.1, 0.25, 0.5, 1.0)
 NOTES = (
@@ -60,7 +60,7 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome((swept,), (figure,), NOTES)
 
 
-def _row(scheme: AnyScheme, held_out: Dataset, budget: float) -> Row:
+def _row(scheme: Scheme, held_out: Dataset, budget: float) -> Row:
     improvements = compare_with_loop(scheme, held_out)
     limit = envelope_limit(held_out, budget, paper_with_budget(budget).gate_sharpness)
     near, everywhere = improvements["distance_near"], improvements["distance"]

@@ -39,7 +39,6 @@ def run(laboratory: Laboratory) -> Outcome:
     ours = compare_with_loop(laboratory.scheme(recipe), held_out)
     unconstrained = compare_with_loop(unconstrained_scheme(laboratory), held_out)
     text = compare_with_loop(laboratory.scheme(paper_text()), held_out)
-    laboratory.progress("the envelope's limit", 0, 1)
     limit = envelope_limit(held_out, recipe.budget, recipe.gate_sharpness)
     rows = [
         *comparison_rows(

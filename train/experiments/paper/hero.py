@@ -76,7 +76,6 @@ def run(laboratory: Laboratory) -> Outcome:
     images: dict[tuple[str, int], np.ndarray] = {}
     errors: dict[tuple[str, int], LevelErrors] = {}
     for panel in panels_of(laboratory):
-        laboratory.progress(f"rendering {TITLES[panel.name]}", len(images), 6)
         image = shaded_image(panel.mesh, panel.distance, LARGEST_ERROR, CAMERA)
         images[panel.name, panel.level] = image
         errors[panel.name, panel.level] = panel.errors
@@ -84,10 +83,10 @@ def run(laboratory: Laboratory) -> Outcome:
         Row(
             method=TITLES[name],
             level=level,
-            faces=shown.faces,
+            faces=shown.figures.faces,
             hausdorff=shown.shape.hausdorff,
-            ratio=shown.ratio,
-            normal_jump=shown.normal_jump,
+            ratio=shown.figures.ratio,
+            normal_jump=shown.figures.normal_jump,
         )
         for (name, level), shown in errors.items()
     ]
@@ -117,7 +116,7 @@ def _draw(
         panel.text(
             0.5,
             -0.02,
-            f"ratio {shown.ratio:.3g}   jump {shown.normal_jump:.2f}",
+            f"ratio {shown.figures.ratio:.3g}   jump {shown.figures.normal_jump:.2f}",
             transform=panel.transAxes,
             ha="center",
             va="top",

@@ -26,7 +26,7 @@ def main(
     ] = Path("results/cache/networks"),
 ) -> None:
     """Train what is not there yet, refine, and write the control mesh and six panels."""
-    write_panels(Laboratory(FULL, networks, checkpoints, None, lambda *_: None), folder)
+    write_panels(Laboratory(FULL, networks, checkpoints, None), folder)
 
 
 def write_panels(laboratory: Laboratory, folder: Path) -> None:
@@ -44,7 +44,7 @@ def write_panels(laboratory: Laboratory, folder: Path) -> None:
 def arrays_of(panel: Panel) -> dict[str, np.ndarray | str]:
     """Return a panel's mesh, its distance, its title, and what its box says."""
     steps = "one step" if panel.level == 1 else f"{panel.level} steps"
-    ratio, jump = panel.errors.ratio, panel.errors.normal_jump
+    ratio, jump = panel.errors.figures.ratio, panel.errors.figures.normal_jump
     largest = f"{ratio:,.0f}" if ratio >= 100 else f"{ratio:.2f}"
     return {
         "vertices": panel.mesh.vertices,

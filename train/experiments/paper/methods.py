@@ -6,25 +6,25 @@ from typing import cast
 
 import msgspec
 
-from pns_common import Mesh, loop
+from pns_common import Mesh, Refinement, Scheme, loop
 from train.baselines.butterfly import modified_butterfly
 from train.baselines.edge_rules import curvature_adaptive, fit_scalar, normal_displacement
 from train.baselines.pn_triangles import pn_triangles
 from train.baselines.quadric import quadric_fit
 from train.data.datasets import Dataset, Instance, ridge_held_out
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.variants import UNCONSTRAINED, variant_method, variant_recipe
+from train.experiments.harness.variants import UNCONSTRAINED, variant_recipe, variant_scheme
 from train.experiments.paper.paper_values import PAPER_INSTANCE
 from train.models.recipe import Recipe, one_step
 from train.models.recipes import paper
-from train.refining import AnyScheme, Refined, refine
+from train.refining import refine
 from train.surfaces.implicit import Ridge
 
 # Reference length of all experiments: the paper's C is absolute.
 PAPER_UNITS = 1.0
 
 
-def eight_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
+def eight_methods(laboratory: Laboratory) -> dict[str, Scheme]:
     """Return Loop, five hand-made methods, PNS and the unconstrained network."""
     recipe = paper()
     training_set = laboratory.dataset(one_step(recipe).dataset)
@@ -40,7 +40,7 @@ def eight_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
     }
 
 
-def learned_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
+def learned_methods(laboratory: Laboratory) -> dict[str, Scheme]:
     """Return Loop and the two learned methods, which the paper's figures set side by side."""
     return {
         "loop": loop(),
@@ -49,13 +49,13 @@ def learned_methods(laboratory: Laboratory) -> dict[str, AnyScheme]:
     }
 
 
-def unconstrained_scheme(laboratory: Laboratory) -> AnyScheme:
+def unconstrained_scheme(laboratory: Laboratory) -> Scheme:
     """Return the unconstrained network, trained on the same ridges; ratios are against PNS's C h².
 
     It is a control that shows what the envelope is for, and no method to use.
     """
     recipe = variant_recipe(paper(), UNCONSTRAINED)
-    return variant_method(UNCONSTRAINED, laboratory.network(recipe, UNCONSTRAINED), recipe)
+    return variant_scheme(UNCONSTRAINED, laboratory.network(recipe, UNCONSTRAINED), recipe)
 
 
 def hard_instance() -> Instance:
@@ -74,7 +74,7 @@ def ridge_of(instance: Instance) -> Ridge:
     return cast(Ridge, instance.surface)
 
 
-def largest_ratio(scheme: AnyScheme, dataset: Dataset) -> float:
+def largest_ratio(scheme: Scheme, dataset: Dataset) -> float:
     """Return the largest proximity ratio of one step, over all instances."""
     return max(
         float(refine(instance.mesh, scheme, 1, reference_length=PAPER_UNITS).ratio.max())
@@ -82,7 +82,7 @@ def largest_ratio(scheme: AnyScheme, dataset: Dataset) -> float:
     )
 
 
-def level_by_level(mesh: Mesh, scheme: AnyScheme, levels: int) -> Iterator[Refined]:
+def level_by_level(mesh: Mesh, scheme: Scheme, levels: int) -> Iterator[Refinement]:
     """Yield the refinement after each level; every step keeps the paper's units."""
     for _ in range(levels):
         refinement = refine(mesh, scheme, levels=1, reference_length=PAPER_UNITS)

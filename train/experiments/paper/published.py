@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pns_common import pns
+from pns_common import Scheme, pns
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.variants import (
@@ -12,7 +12,7 @@ from train.experiments.harness.variants import (
     WITHOUT_GATE,
     WITHOUT_SQUARE,
     Variant,
-    variant_method,
+    variant_scheme,
 )
 from train.experiments.paper.ablation import architecture_numbers
 from train.experiments.paper.paper_values import (
@@ -30,7 +30,6 @@ from train.models.networks import BoundedNet
 from train.models.published import GATE_SHARPNESS, load_published, published_budget
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
-from train.refining import AnyScheme
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +112,14 @@ NOTES = (
 )
 
 
-def published_scheme(claim: Claim, network: BoundedNet) -> AnyScheme:
+def published_scheme(claim: Claim, network: BoundedNet) -> Scheme:
     """Return the scheme that a published network was trained in."""
     budget = published_budget(claim.checkpoint)
     recipe = replace(paper(), name=claim.checkpoint, budget=budget, gate_sharpness=GATE_SHARPNESS)
     if claim.variant is None:
         return pns(recipe_model(recipe, network), budget)
     own = replace(recipe, features=claim.variant.features)
-    return variant_method(claim.variant, network, own)
+    return variant_scheme(claim.variant, network, own)
 
 
 def claimed_improvement(claim: Claim, improvement: Improvement) -> float:
@@ -135,8 +134,7 @@ def run(laboratory: Laboratory) -> Outcome:
     assert laboratory.published is not None  # needs_published
     networks = load_published(laboratory.published)
     rows: list[ImprovementRow] = []
-    for number, claim in enumerate(CLAIMS):
-        laboratory.progress(f"published {claim.checkpoint}", number, len(CLAIMS))
+    for claim in CLAIMS:
         if claim.checkpoint not in networks:
             continue
         scheme = published_scheme(claim, networks[claim.checkpoint])

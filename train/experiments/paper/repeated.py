@@ -5,16 +5,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.figure import Figure as Drawing
 
+from pns_common import Scheme
 from train.data.datasets import Instance
 from train.experiments.harness.experiment import Experiment, Figure, Outcome, column, table
 from train.experiments.harness.laboratory import Laboratory
 from train.experiments.harness.style import TITLES, method_style, panels
 from train.experiments.paper.methods import eight_methods, hard_instance, level_by_level
 from train.experiments.paper.paper_values import PAPER_REPEATED
-from train.metrics.shape import DistanceLevel, LevelErrors, distance_level, level_errors
-from train.refining import AnyScheme
+from train.metrics.shape import LevelErrors, level_errors
+from train.refining import figures
+from train.surfaces.implicit import signed_distance
 
 NOTES = (
     "Errors are over all vertices, old ones included; a flipped face opposes its Loop counterpart "
@@ -70,33 +73,26 @@ def run(laboratory: Laboratory) -> Outcome:
     methods, levels = eight_methods(laboratory), laboratory.scale.levels
     instances = laboratory.dataset("ridge-held-out").instances
     hard, summary, by_level = hard_instance(), [], []
-    curves: dict[str, list[list[DistanceLevel]]] = {}
-    for number, (name, scheme) in enumerate(methods.items()):
-        laboratory.progress(f"repeated {TITLES[name]}", number, len(methods))
+    curves: dict[str, Float[np.ndarray, "I L 3"]] = {}
+    for name, scheme in methods.items():
         errors_of_levels = measure(hard, scheme, levels)
         summary.append(_summary(name, errors_of_levels))
         by_level += [
             LevelRow(
                 method=TITLES[name],
                 level=errors.level,
-                faces=errors.faces,
+                faces=errors.figures.faces,
                 distance=errors.shape.distance,
                 hausdorff=errors.shape.hausdorff,
                 normal_mean=errors.shape.normal_mean,
                 normal_max=errors.shape.normal_max,
-                normal_jump=errors.normal_jump,
-                ratio=errors.ratio,
-                flipped=errors.flipped,
+                normal_jump=errors.figures.normal_jump,
+                ratio=errors.figures.ratio,
+                flipped=errors.figures.flipped,
             )
             for errors in errors_of_levels
         ]
-        curves[name] = [
-            [
-                distance_level(instance.surface, refinement)
-                for refinement in level_by_level(instance.mesh, scheme, levels)
-            ]
-            for instance in instances
-        ]
+        curves[name] = np.array([curve(instance, scheme, levels) for instance in instances])
     figure = Figure(
         "repeated",
         "Eight methods on the held-out ridges, level by level. Left: distance RMSE over all "
@@ -111,13 +107,19 @@ def run(laboratory: Laboratory) -> Outcome:
     return Outcome(tables, (figure,), NOTES)
 
 
-def measure(instance: Instance, scheme: AnyScheme, levels: int) -> list[LevelErrors]:
+def measure(instance: Instance, scheme: Scheme, levels: int) -> list[LevelErrors]:
     """Return the errors after each level."""
     steps = level_by_level(instance.mesh, scheme, levels)
-    return [
-        level_errors(instance.surface, refinement, level)
-        for level, refinement in enumerate(steps, start=1)
-    ]
+    return [level_errors(instance.surface, made, level) for level, made in enumerate(steps, 1)]
+
+
+def curve(instance: Instance, scheme: Scheme, levels: int) -> list[tuple[float, float, float]]:
+    """Return after each level the distance, root mean square, and largest ratio and jump."""
+    points = []
+    for made in level_by_level(instance.mesh, scheme, levels):
+        distance, last = signed_distance(instance.surface, made.mesh.vertices), figures(made)[-1]
+        points.append((float(np.sqrt((distance**2).mean())), last.ratio, last.normal_jump))
+    return points
 
 
 def _summary(name: str, levels: list[LevelErrors]) -> Summary:
@@ -127,9 +129,9 @@ def _summary(name: str, levels: list[LevelErrors]) -> Summary:
         method=TITLES[name],
         level1_max_error=levels[0].shape.hausdorff,
         last_max_error=last.shape.hausdorff,
-        last_normal_jump=last.normal_jump,
-        max_ratio=max(errors.ratio for errors in levels),
-        last_flipped=last.flipped,
+        last_normal_jump=last.figures.normal_jump,
+        max_ratio=max(errors.figures.ratio for errors in levels),
+        last_flipped=last.figures.flipped,
         paper_level1_max_error=first_error,
         paper_last_max_error=last_error,
         paper_last_normal_jump=jump,
@@ -137,14 +139,12 @@ def _summary(name: str, levels: list[LevelErrors]) -> Summary:
     )
 
 
-def _draw(curves: Mapping[str, list[list[DistanceLevel]]]) -> Drawing:
+def _draw(curves: Mapping[str, Float[np.ndarray, "I L 3"]]) -> Drawing:
     figure, (distance, ratio, jump) = panels(3, height=2.9)
-    level = range(1, len(next(iter(curves.values()))[0]) + 1)
+    level = range(1, next(iter(curves.values())).shape[1] + 1)
     for name, runs in curves.items():
         style = method_style(name)
-        errors = np.array([[step.distance for step in run] for run in runs])
-        ratios = np.array([[step.ratio for step in run] for run in runs])
-        jumps = np.array([[step.jump for step in run] for run in runs])
+        errors, ratios, jumps = runs.transpose(2, 0, 1)
         distance.plot(level, errors.mean(axis=0), **style)
         if name != "loop":
             ratio.plot(level, np.maximum(ratios.max(axis=0), 1e-3), **style)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pns_common import Scheme
 from train.data.datasets import Dataset
 from train.experiments.harness.comparison import LIMIT_NOTE, Comparison, comparison_rows
 from train.experiments.harness.experiment import Experiment, Outcome, column, table
@@ -13,7 +14,7 @@ from train.experiments.paper.paper_values import PUBLISHED_SADDLE
 from train.metrics.card import compare_with_loop
 from train.metrics.envelope import envelope_limit
 from train.models.recipes import paper
-from train.refining import AnyScheme, refine
+from train.refining import refine
 
 NOTES = (
     LIMIT_NOTE,
@@ -38,7 +39,7 @@ class GateRow:
     share_active: float = column("Gate above 0.01", ".1%")
 
 
-def gate_row(scheme: AnyScheme, dataset: Dataset) -> GateRow:
+def gate_row(scheme: Scheme, dataset: Dataset) -> GateRow:
     """Return mean, maximum and active share of the gate over a data set's inserted vertices."""
     gates = np.concatenate(
         [

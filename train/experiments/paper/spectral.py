@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from pns_common import Scheme
 from train.certificates.adversary import Operator
 from train.certificates.gap_collapse import GapAttack, gap_attack, operator_jacobian
 from train.certificates.planar_spectrum import derivative_of_departure, spectrum
@@ -15,7 +16,6 @@ from train.experiments.harness.style import COLOURS, panels, zero_line
 from train.experiments.paper.paper_values import PUBLISHED_SPECTRAL
 from train.models.recipes import paper
 from train.models.torch_model import recipe_model
-from train.refining import AnyScheme
 from train.spectra.spectrum import (
     SPOKE,
     TANGENT_COUNT,
@@ -80,18 +80,10 @@ def run(laboratory: Laboratory) -> Outcome:
     exact = subject_of_network(recipe_model(recipe, network)).exact
     operator = Operator(in_double(network), recipe)
     valences = VALENCES[: laboratory.scale.instances]
-    rows = []
-    for done, valence in enumerate(valences):
-        laboratory.progress("planar spectrum", done, len(valences))
-        rows.append(planar_row(exact, operator, valence))
+    rows = [planar_row(exact, operator, valence) for valence in valences]
     steps = min(ATTACK_STEPS, laboratory.scale.training_steps)
     attacks = [
-        gap_attack(
-            replace(recipe, budget=budget),
-            ATTACKED,
-            steps,
-            lambda done, _, c=budget: laboratory.progress(f"gap collapse, C = {c:g}", done, steps),
-        )
+        gap_attack(replace(recipe, budget=budget), ATTACKED, steps)
         for budget in BUDGETS[: laboratory.scale.instances]
     ]
     return Outcome(
@@ -119,7 +111,7 @@ def run(laboratory: Laboratory) -> Outcome:
     )
 
 
-def planar_row(exact: AnyScheme, operator: Operator, valence: int) -> PlanarRow:
+def planar_row(exact: Scheme, operator: Operator, valence: int) -> PlanarRow:
     """Return one row of the table, from an operator in double precision and as a scheme."""
     size = spectrum(exact, valence)
     star = closed_star(exact, valence)(0.0)
@@ -140,7 +132,7 @@ def planar_row(exact: AnyScheme, operator: Operator, valence: int) -> PlanarRow:
     )
 
 
-def one_ring_gap(scheme: AnyScheme, valence: int) -> float:
+def one_ring_gap(scheme: Scheme, valence: int) -> float:
     """Return the Reif gap of the (k+1)-star, as it was published."""
     matrix = without_translations(jacobian(scheme, star(valence, 2, SPOKE, inner_rings=1)))
     return reif_gap(np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1])

@@ -26,7 +26,7 @@ from train.experiments.harness.experiment import (
     table,
 )
 from train.experiments.harness.laboratory import Laboratory
-from train.experiments.harness.variants import VARIANTS, variant_method, variant_recipe
+from train.experiments.harness.variants import VARIANTS, variant_recipe, variant_scheme
 from train.experiments.paper.ablation import REMOVED_TITLES
 from train.experiments.paper.paper_values import PUBLISHED_ADVERSARIAL, PUBLISHED_STRUCTURAL
 from train.models.from_recipe import initial_network
@@ -104,11 +104,9 @@ def run(laboratory: Laboratory) -> Outcome:
     subjects = [
         subject_of_network(recipe_model(recipe, net), recipe.budget) for net in networks.values()
     ]
-    certified = [
-        certify(subject, laboratory, name) for name, subject in zip(networks, subjects, strict=True)
-    ]
+    certified = [certify(subject, laboratory) for subject in subjects]
     removed = [
-        (name, certify(lacking(name, laboratory), laboratory, name))
+        (name, certify(lacking(name, laboratory), laboratory))
         for name in list(REMOVED_TITLES)[: laboratory.scale.instances]
     ]
     return Outcome(
@@ -140,25 +138,19 @@ def run_attacks(recipe: Recipe, laboratory: Laboratory) -> list[Attack]:
     """Run the adversaries of what is promised; the first is the one of proximity."""
     steps = min(ATTACK_STEPS, laboratory.scale.training_steps)
     turn, _ = random_motion(np.random.default_rng(SEED))
-
-    def watch(name: str):
-        return lambda done, _: laboratory.progress(f"adversary of {name}", done, steps)
-
     return [
-        proximity_attack(recipe, steps, watch("proximity")),
-        equivariance_attack(recipe, steps, watch("equivariance")),
-        affine_attack(recipe, np.eye(3), 0.0, steps, watch("affine reproduction")),
-        affine_attack(recipe, turn, TURNED, steps, watch("affine reproduction, turned")),
+        proximity_attack(recipe, steps),
+        equivariance_attack(recipe, steps),
+        affine_attack(recipe, np.eye(3), 0.0, steps),
+        affine_attack(recipe, turn, TURNED, steps),
     ]
 
 
-def certify(subject: Subject, laboratory: Laboratory, name: str) -> tuple[Certificate, ...]:
+def certify(subject: Subject, laboratory: Laboratory) -> tuple[Certificate, ...]:
     """Certify T1–T8; lifted stars have an experiment of their own."""
     valences = VALENCES[: laboratory.scale.instances]
     steps = [step for step in scheme_steps(subject, (), SEED, valences) if step.theorem != "stars"]
-    return run_steps(
-        steps, lambda title, done, of: laboratory.progress(f"{name}: {title}", done, of)
-    )
+    return run_steps(steps, lambda title, done, of: None)
 
 
 def lacking(name: str, laboratory: Laboratory) -> Subject:
@@ -170,7 +162,7 @@ def lacking(name: str, laboratory: Laboratory) -> Subject:
 def variant_subject(name: str, network: BoundedNet, recipe: Recipe) -> Subject:
     """Return a variant of the operator with a network of its recipe."""
     single, double = (
-        variant_method(VARIANTS[name], exact, recipe) for exact in (network, in_double(network))
+        variant_scheme(VARIANTS[name], exact, recipe) for exact in (network, in_double(network))
     )
     return Subject(name, single, double, recipe.budget)
 

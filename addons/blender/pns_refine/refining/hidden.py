@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Int
 
-from .snapshot import Domain, Faces, Layer, Rule
+from pns_common.mesh.topology import Topology
+
+from .shading import switch
+from .snapshot import Layer
 
 FACES, EDGES, POINTS = ".hide_poly", ".hide_edge", ".hide_vert"
 
 
 def hide_within(
     layers: tuple[Layer, ...],
-    faces: Faces,
+    topology: Topology,
     edges: Int[np.ndarray, "E 2"],
     inner: Bool[np.ndarray, " E"],
     old: int,
@@ -27,13 +30,10 @@ def hide_within(
     if FACES not in own or not own[FACES].any():
         return layers
     face_of = np.zeros(len(edges), dtype=np.int64)
-    face_of[faces.edges] = np.repeat(np.arange(len(faces.parents)), np.diff(faces.starts))
+    face_of[topology.corner_edges] = topology.face_of(np.arange(len(topology.corners)))
     edge_hidden = own.get(EDGES, np.zeros(len(edges), bool)) | (inner & own[FACES][face_of])
     point_hidden = np.ones(count, dtype=bool)
     point_hidden[edges[~edge_hidden]] = False
     point_hidden[:old] = own.get(POINTS, np.zeros(count, bool))[:old]
-    hidden = (
-        Layer(EDGES, "BOOLEAN", Domain.EDGE, Rule.KEEP, edge_hidden[:, None]),
-        Layer(POINTS, "BOOLEAN", Domain.POINT, Rule.VOTE, point_hidden[:, None]),
-    )
+    hidden = switch(EDGES, "EDGE", edge_hidden), switch(POINTS, "POINT", point_hidden)
     return (*(layer for layer in layers if layer.name not in (EDGES, POINTS)), *hidden)

@@ -7,16 +7,21 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pns_common.mesh.normals import measure_faces
-from pns_common.parallel import Blocks, available_threads
-from pns_common.schemes.limit import limit_normals
+from pns_common.carry import rules
 
-from .positions import Positions
-from .snapshot import Domain, Layer, Rule
-from .steps import Steps
+from .snapshot import Domain, Layer
 
-NORMALS = Layer("normals", "NORMAL", Domain.CORNER, Rule.BLEND, np.empty((0, 3)), unit=True)
 SHARP_EDGE, SHARP_FACE = "sharp_edge", "sharp_face"
+
+
+def normals_layer(values: Float[np.ndarray, "C 3"]) -> Layer:
+    """Return normals of corners as an attribute."""
+    return Layer(values, rules.smooth, unit=True, name="normals", kind="NORMAL", domain="CORNER")
+
+
+def switch(name: str, domain: Domain, on: Bool[np.ndarray, " N"]) -> Layer:
+    """Return switches of old elements as an attribute."""
+    return Layer(on[:, None], rules.old, name=name, kind="BOOLEAN", domain=domain)
 
 
 def shaded(
@@ -39,28 +44,13 @@ def shaded(
     for layer in layers:
         if layer.name == SHARP_FACE and (smooth or layer.values.all()):
             continue
-        if layer.name == SHARP_EDGE and layer.domain is Domain.EDGE:
+        if layer.name == SHARP_EDGE and layer.domain == "EDGE":
             sharp |= layer.values[:, 0].astype(bool)
             continue
         made.append(layer)
     if sharp.any():
-        flags = sharp[:, None]
-        made.append(Layer(SHARP_EDGE, "BOOLEAN", Domain.EDGE, Rule.KEEP, flags))
+        made.append(switch(SHARP_EDGE, "EDGE", sharp))
     flat = any(layer.name == SHARP_FACE for layer in made)
     if normals is not None and not flat and all(x.kind != "NORMAL" for x in made):
-        made.append(NORMALS.of(normals(sharp[: len(sharp) - loose])))
+        made.append(normals_layer(normals(sharp[: len(sharp) - loose])))
     return made
-
-
-def corner_normals(
-    steps: Steps, positions: Positions, sharp: Bool[np.ndarray, " E"]
-) -> Float[np.ndarray, "C 3"]:
-    """Return the limit surface's normal at each corner of whole levels, one-sided along edges."""
-    blocks = Blocks(available_threads())
-    topology = steps.at_last.with_creases(np.flatnonzero(sharp))
-    found = limit_normals(positions.controls, topology, blocks, steps.base)
-    normals = found.sectors[found.sector_of_corner]
-    # Where the surface has none its face has one.
-    faces, _ = measure_faces(positions.points, topology, blocks, areas=False)
-    owner = topology.face_of(np.arange(len(normals)))
-    return np.where(normals.any(axis=1)[:, None], normals, faces[owner])

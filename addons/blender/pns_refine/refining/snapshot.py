@@ -2,65 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common import Mesh
+from pns_common.carry.carried import Column
+from pns_common.mesh.topology import Topology
+
+Domain = Literal["POINT", "EDGE", "FACE", "CORNER"]
 
 
-class Domain(Enum):
-    """Elements that a layer's rows belong to."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Layer(Column):
+    """An attribute: a column of the library's, with a row for each element of the domain.
 
-    POINT = "POINT"
-    EDGE = "EDGE"
-    FACE = "FACE"
-    CORNER = "CORNER"
-
-
-class Rule(Enum):
-    """Rule by which a new row comes of old ones."""
-
-    # Weighted by the scheme's masks.
-    BLEND = "blend"
-    # One of the parents' values: that of most, as numbers that only name something must not mix.
-    VOTE = "vote"
-    # An old element's value for what is left of it, and zero for what is new.
-    KEEP = "keep"
-
-
-class Smoothing(Enum):
-    """Values of corners that stay, by the names of Blender's Subdivision Surface for UV maps."""
-
-    NONE = "NONE"
-    PRESERVE_CORNERS = "PRESERVE_CORNERS"
-    PRESERVE_BOUNDARIES = "PRESERVE_BOUNDARIES"
-    SMOOTH_ALL = "SMOOTH_ALL"
-
-
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """One attribute: ``values`` (N, K), a row for each element of the domain.
-
-    ``kind`` is Blender's type of it. ``names`` are the texts that values are places in, where the
-    attribute is text. ``unit`` says that rows are directions or rotations, kept at length 1.
+    ``kind`` is Blender's type of it. ``texts`` are what values are places in, where it is text.
+    At edges and faces old ones give their values to their parts, and what is new has zeros.
     """
 
     name: str
     kind: str
     domain: Domain
-    rule: Rule
-    values: np.ndarray
-    names: tuple[Any, ...] = ()
-    unit: bool = False
-
-    def of(self, values: np.ndarray) -> Layer:
-        """Return the same attribute with other rows."""
-        return replace(self, values=values)
+    texts: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +71,14 @@ class Snapshot:
         """Tell whether a face has more than three corners."""
         return len(self.triangles) != len(self.polygon_corners) - 1
 
+    def marked(self, name: str, domain: Domain) -> Bool[np.ndarray, " N"]:
+        """Return where a switch of this name is on; nowhere, where there is none."""
+        for layer in self.layers:
+            if (layer.name, layer.domain) == (name, domain):
+                return layer.values[:, 0].astype(bool)
+        counts = {"EDGE": len(self.edges), "FACE": len(self.polygon_corners) - 1}
+        return np.zeros(counts[domain], dtype=bool)
+
     def control(self, *, whole: bool) -> Control:
         """Return the polygons, ``whole`` or cut into triangles.
 
@@ -112,49 +87,59 @@ class Snapshot:
         """
         if not whole:
             triangles = Mesh(self.points, self.triangles)
-            return Control(triangles, self.corners.reshape(-1), self.polygons)
+            return Control(triangles, self.corners.reshape(-1), self.polygons, self.edges)
         count = self.polygon_corners[-1]
         vertices = np.empty(count, dtype=np.int64)
         vertices[self.corners] = self.triangles
         polygons = Mesh(self.points, (vertices, self.polygon_corners))
-        return Control(polygons, np.arange(count), np.arange(len(self.polygon_corners) - 1))
+        faces = np.arange(len(self.polygon_corners) - 1)
+        return Control(polygons, np.arange(count), faces, self.edges)
 
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """The mesh to refine, the snapshot's corner of each corner, and its polygon of each face."""
+    """The mesh to refine; the snapshot's corner of each corner, polygon of each face, and edges."""
 
     mesh: Mesh
     corners: Int[np.ndarray, " H"]
     polygons: Int[np.ndarray, " F"]
+    edges: Int[np.ndarray, "E 2"]
 
+    @cached_property
+    def topology(self) -> Topology:
+        """The connectivity of the mesh."""
+        return self.mesh.topology()
 
-@dataclass(frozen=True, eq=False)
-class Faces:
-    """The faces of a result as Blender holds them.
+    @cached_property
+    def there(self) -> Bool[np.ndarray, " E"]:
+        """True for edges of the snapshot that are edges of the mesh."""
+        return np.isin(edge_keys(self.edges), edge_keys(self.topology.edges))
 
-    ``starts`` (F + 1) says where each face's corners begin; ``vertices`` and ``edges`` are those of
-    the corners (an edge runs from its corner to the next); ``parents`` are the old polygons.
-    """
-
-    starts: Int[np.ndarray, " F+1"]
-    vertices: Int[np.ndarray, " C"]
-    edges: Int[np.ndarray, " C"]
-    parents: Int[np.ndarray, " F"]
+    @cached_property
+    def own_edge(self) -> Int[np.ndarray, " G"]:
+        """The snapshot's edge of each edge of the mesh; −1 for diagonals that cut polygons."""
+        own = np.full(len(self.topology.edges), -1, dtype=np.int64)
+        own[self.topology.rows_of(self.edges[self.there])] = np.flatnonzero(self.there)
+        return own
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
     """A refined snapshot: the same arrays at the new vertices, edges, faces and corners.
 
-    ``ratio`` and ``gate`` are the operator's diagnostics, ``distance`` is how far each vertex lies
-    from where the base scheme alone would have it. ``normals`` are the surface's own, where they
-    are known.
-    ``split_vertices`` counts old vertices of faces' borders that share their place with another.
+    Attributes:
+        topology: the faces, with their edges.
+        polygons: the old polygon that each face is part of.
+        edges: those of the faces, then those without.
+        ratio, gate: the operator's diagnostics.
+        distance: how far each vertex lies from where the base scheme alone would have it.
+        report: the library's.
+        split_vertices: how many old vertices of borders share their place with another.
     """
 
     points: Float[np.ndarray, "W 3"]
-    faces: Faces
+    topology: Topology
+    polygons: Int[np.ndarray, " F"]
     edges: Int[np.ndarray, "E 2"]
     crease_sharpness: Float[np.ndarray, " E"]
     vertex_sharpness: Float[np.ndarray, " W"]
@@ -164,7 +149,6 @@ class Refined:
     ratio: Float[np.ndarray, " W"]
     gate: Float[np.ndarray, " W"]
     distance: Float[np.ndarray, " W"]
-    normals: Float[np.ndarray, "W 3"] | None
     report: dict[str, Any]
     split_vertices: int
 

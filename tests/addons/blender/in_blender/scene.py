@@ -1,66 +1,78 @@
-"""Objects to refine, and what is in them as arrays."""
+"""Objects to refine, what Blender's timer does with those that are live, and arrays of both."""
 
-from __future__ import annotations
-
-from pathlib import Path
+import json
 
 import bpy
 import numpy as np
+from bl_ext.user_default.pns_refine.live_watch import WATCH
 
-NAME = "bl_ext.user_default.pns_refine"
 # A cube whose faces look outwards.
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
-def cube(name: str = "Cube") -> bpy.types.Object:
+def cube(name="Cube"):
     """A cube of quads, active and selected."""
     return placed(name, CORNERS, SIDES)
 
 
-def grid(cells: int, name: str = "Grid") -> bpy.types.Object:
+def grid(cells, name="Grid"):
     """A hilly square of so many quads a side."""
-    side = cells + 1
-    across, along = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side), indexing="ij")
-    points = np.stack([across, along, 0.2 * np.sin(3 * across) * np.cos(2 * along)], axis=-1)
-    first = (np.arange(cells)[:, None] * side + np.arange(cells)).reshape(-1)
-    quads = np.stack([first, first + side, first + side + 1, first + 1], axis=1)
-    return placed(name, points.reshape(-1, 3).tolist(), quads.tolist())
+    steps, side = np.linspace(-1, 1, cells + 1), cells + 1
+    points = [(x, y, 0.2 * np.sin(3 * x) * np.cos(2 * y)) for x in steps for y in steps]
+    firsts = [i * side + j for i in range(cells) for j in range(cells)]
+    return placed(name, points, [(f, f + side, f + side + 1, f + 1) for f in firsts])
 
 
-def placed(name: str, points: list, faces: list, edges: list = ()) -> bpy.types.Object:
+def placed(name, points, faces, edges=()):
     """An object of these, active and selected."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, edges, faces)
     mesh.update()
-    obj = bpy.data.objects.new(name, mesh)
+    return shown_here(bpy.data.objects.new(name, mesh))
+
+
+def shown_here(obj):
+    """The object in the scene, active and selected."""
     bpy.context.scene.collection.objects.link(obj)
-    chosen(obj)
-    return obj
+    return chosen(obj)
 
 
-def linked(obj: bpy.types.Object, path: Path) -> bpy.types.Object:
+def linked(obj, path):
     """The same object in an empty file, linked from a file that is written to the path."""
     name = obj.name
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
     with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
         wanted.objects = [name]
-    there = bpy.data.objects[name]
-    bpy.context.scene.collection.objects.link(there)
-    chosen(there)
-    return there
+    return shown_here(bpy.data.objects[name])
 
 
-def chosen(obj: bpy.types.Object) -> None:
+def chosen(obj):
     """Make it the only one that is selected, and active."""
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
+    return obj
 
 
-def refined(obj: bpy.types.Object, **settings: object) -> bpy.types.Object:
+def rigged(obj, **bones):
+    """A rig that moves the object by groups of these bones' names, each at its x."""
+    rig = shown_here(bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig")))
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, (x, weight) in bones.items():
+        bone = rig.data.edit_bones.new(name)
+        bone.head, bone.tail = (x, 0, 0), (x, 0, 1)
+        group = obj.vertex_groups.new(name=name)
+        for vertex in obj.data.vertices:
+            group.add([vertex.index], weight(vertex.co.x), "REPLACE")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.modifiers.new("Armature", "ARMATURE").object = rig
+    return rig
+
+
+def refined(obj, **settings):
     """The new object that the operator makes of it."""
     chosen(obj)
     assert bpy.ops.object.pns_refine(**settings) == {"FINISHED"}
@@ -70,24 +82,55 @@ def refined(obj: bpy.types.Object, **settings: object) -> bpy.types.Object:
     return new
 
 
-def points_of(mesh: bpy.types.Mesh) -> np.ndarray:
+def notes(obj):
+    """The losses that the panel names."""
+    return "\n".join(json.loads(obj.data.pns_result.notes))
+
+
+def points_of(mesh):
     """The vertices (V, 3)."""
     return numbers(mesh.vertices, "co", 3)
 
 
-def numbers(rows: bpy.types.bpy_prop_collection, field: str, width: int = 1) -> np.ndarray:
+def numbers(rows, field="value", width=1):
     """A field of all rows, (N, width)."""
     values = np.empty(len(rows) * width, np.float32)
     rows.foreach_get(field, values)
     return values.reshape(-1, width).astype(np.float64)
 
 
-def triangles_of(mesh: bpy.types.Mesh) -> np.ndarray:
-    """The triangles (T, 3) that Blender cuts the faces into."""
-    mesh.calc_loop_triangles()
-    return numbers(mesh.loop_triangles, "vertices", 3).astype(np.int64)
-
-
-def evaluated(obj: bpy.types.Object) -> bpy.types.Mesh:
+def evaluated(obj):
     """The mesh with all modifiers."""
+    bpy.context.view_layer.update()
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def started(obj, **settings):
+    """The object, live, with these settings."""
+    chosen(obj)
+    assert bpy.ops.object.pns_live_add() == {"FINISHED"}
+    for name, value in settings.items():
+        setattr(obj.data.pns_live, name, value)
+    if settings:
+        bpy.ops.object.pns_live_refresh()
+    return obj
+
+
+def edit(obj, settled=True):
+    """Lift a vertex of the mesh, and let the timer follow."""
+    obj.data.vertices[7].co.z += 1
+    obj.data.update()
+    if settled:
+        settle()
+
+
+def settle():
+    """Run at once what Blender's timer does in the seconds after an edit."""
+    for _ in range(100):
+        # As Blender does between two ticks: what a refresh changes is no edit.
+        bpy.context.view_layer.update()
+        if WATCH.run is not None:
+            WATCH.run.finish()
+        if WATCH.advance(quiet=0) is None:
+            return
+    raise AssertionError("it never settles")

@@ -1,265 +1,294 @@
-"""One claim for each attribute, map and key that a refined object keeps."""
+"""Parts that a refined object keeps of its own, a claim each."""
 
 import math
 
 import bpy
 import numpy as np
 import pytest
+from mathutils.kdtree import KDTree
 from scene import (
+    chosen,
     cube,
+    evaluated,
     grid,
+    notes,
     numbers,
+    placed,
     points_of,
     refined,
+    rigged,
 )
 
-TYPES = [
-    ("FLOAT", "value", 1.5),
-    ("INT", "value", 7),
-    ("INT8", "value", 5),
-    ("BOOLEAN", "value", True),
-    ("FLOAT_VECTOR", "vector", (1, 2, 3)),
-    ("FLOAT2", "vector", (1, 2)),
-    ("FLOAT_COLOR", "color", (0.1, 0.2, 0.3, 0.4)),
-    ("BYTE_COLOR", "color", (1, 0, 1, 1)),
-    ("QUATERNION", "value", (0.6, 0, 0.8, 0)),
-    ("FLOAT4X4", "value", tuple(range(16))),
-    ("INT32_2D", "value", (3, -4)),
-    ("STRING", "value", b"name"),
-]
+VALUES = {
+    "FLOAT": ("value", 1.5),
+    "INT": ("value", 7),
+    "INT8": ("value", 5),
+    "BOOLEAN": ("value", True),
+    "FLOAT_VECTOR": ("vector", (1, 2, 3)),
+    "FLOAT2": ("vector", (1, 2)),
+    "FLOAT_COLOR": ("color", (0.1, 0.2, 0.3, 0.4)),
+    "BYTE_COLOR": ("color", (1, 0, 1, 1)),
+    "QUATERNION": ("value", (0.6, 0, 0.8, 0)),
+    "FLOAT4X4": ("value", (1, 2, 3, 4, 2, 5, 6, 7, 3, 6, 8, 9, 4, 7, 9, 10)),
+    "INT32_2D": ("value", (3, -4)),
+    "STRING": ("value", b"name"),
+}
 
 
-@pytest.mark.parametrize(("kind", "field", "value"), TYPES)
 @pytest.mark.parametrize("domain", ["POINT", "EDGE", "FACE", "CORNER"])
-def test_a_constant_attribute_stays_constant(kind, field, value, domain):
+def test_attributes_of_every_type_keep_what_is_the_same_everywhere(domain):
     obj = cube()
-    attribute = obj.data.attributes.new("mine", kind, domain)
-    if kind == "STRING":
-        for row in attribute.data:
-            row.value = value
-    else:
-        rows = np.tile(np.asarray(value).reshape(-1), len(attribute.data))
-        attribute.data.foreach_set(field, rows)
-    carried = refined(obj, levels=1).data.attributes["mine"]
-    assert (carried.data_type, carried.domain) == (kind, domain)
-    rows = values_of(carried, field, np.size(value))
-    kept = rows.any(axis=1) if rows.dtype.kind == "f" else rows[:, 0] != b""
-    # Twenty-four halves of edges keep it; what is new inside faces is zero.
-    assert kept.sum() == (24 if domain == "EDGE" else len(rows))
-    for row in rows[kept]:
-        if kind == "STRING":
-            assert row[0] == value
-        else:
-            np.testing.assert_allclose(row, np.reshape(value, -1), atol=1e-5)
+    for kind, (field, value) in VALUES.items():
+        for row in obj.data.attributes.new(kind, kind, domain).data:
+            setattr(row, field, np.reshape(value, (4, 4)) if kind == "FLOAT4X4" else value)
+    new = refined(obj, levels=1).data
+    for kind, (field, value) in VALUES.items():
+        attribute = new.attributes[kind]
+        assert (attribute.data_type, attribute.domain) == (kind, domain)
+        rows = [numbers_in(getattr(row, field)) for row in attribute.data]
+        kept = [row for row in rows if any(row)]
+        # Twenty-four halves of edges keep it; what is new inside faces is zero.
+        assert len(kept) == (24 if domain == "EDGE" else len(rows))
+        assert all(row == pytest.approx(numbers_in(value), abs=1e-5) for row in kept)
 
 
-def values_of(attribute, field, width):
-    """All rows of an attribute."""
-    if attribute.data_type == "STRING":
-        texts = [row.value for row in attribute.data]
-        return np.array([[t.encode() if isinstance(t, str) else t] for t in texts])
-    if attribute.data_type == "BOOLEAN":
-        rows = np.empty(len(attribute.data), np.bool_)
-        attribute.data.foreach_get(field, rows)
-        return rows[:, None].astype(float)
-    return numbers(attribute.data, field, width)
-
-
-def test_whole_numbers_are_never_mixed():
-    obj = grid(4)
-    attribute = obj.data.attributes.new("mine", "INT", "POINT")
-    given = np.arange(len(attribute.data), dtype=np.int32) * 1000
-    attribute.data.foreach_set("value", given)
-    kept = refined(obj).data.attributes["mine"]
-    values = numbers(kept.data, "value").astype(int).ravel()
-    assert set(values) <= set(given.tolist())
-    np.testing.assert_array_equal(values[: len(given)], given)
-
-
-def test_seams_of_a_uv_map_do_not_crack():
-    obj = cube()
-    layer = obj.data.uv_layers.new(name="Map")
-    rng = np.random.default_rng(0)
-    for row in layer.data:
-        row.uv = rng.random(2)
-    new = refined(obj, levels=2).data
-    uv = numbers(new.uv_layers["Map"].data, "uv", 2)
-    corners = numbers(new.loops, "vertex_index").astype(int).ravel()
-    # Every side is a patch of its own: along its border, the map must be the straight line between
-    # the corners it had, whatever the other side does.
-    side = np.repeat(np.arange(6), 16)
-    old = numbers(layer.data, "uv", 2)
-    for face, side_of in enumerate(side):
-        for corner in range(4 * face, 4 * face + 4):
-            vertex = corners[corner]
-            if vertex < 8:
-                starts = 4 * side_of
-                place = [obj.data.loops[starts + i].vertex_index for i in range(4)].index(vertex)
-                np.testing.assert_allclose(uv[corner], old[starts + place], atol=1e-6)
-    first_level = refined(obj, levels=1).data
-    uv = numbers(first_level.uv_layers["Map"].data, "uv", 2)
-    edges = {tuple(sorted(e.vertices)): i for i, e in enumerate(obj.data.edges)}
-    checked = 0
-    for number, loop in enumerate(first_level.loops):
-        face = number // 4 // 4
-        ends = [tuple(sorted(e)) for e in edges if loop.vertex_index >= 8]
-        for a, b in ends:
-            middle = middle_of(first_level, a, b)
-            if middle != loop.vertex_index:
-                continue
-            side_of = face
-            ring = [obj.data.loops[4 * side_of + i].vertex_index for i in range(4)]
-            if a in ring and b in ring:
-                expected = (old[4 * side_of + ring.index(a)] + old[4 * side_of + ring.index(b)]) / 2
-                np.testing.assert_allclose(uv[number], expected, atol=1e-6)
-                checked += 1
-    assert checked == 6 * 4 * 2
-
-
-def middle_of(mesh, a, b):
-    """The vertex that stands on the edge between two old ones."""
-    beside = [set(), set()]
-    for edge in mesh.edges:
-        for place, end in enumerate((a, b)):
-            if end in edge.vertices:
-                beside[place] |= set(edge.vertices) - {end}
-    common = beside[0] & beside[1]
-    return next(iter(common)) if len(common) == 1 else None
-
-
-def test_a_map_without_seams_follows_the_surface():
-    obj = grid(6)
-    layer = obj.data.uv_layers.new(name="Map")
-    for loop, row in zip(obj.data.loops, layer.data, strict=True):
-        row.uv = obj.data.vertices[loop.vertex_index].co.xy
-    new = refined(obj, levels=1, scheme="LOOP").data
-    uv = numbers(new.uv_layers["Map"].data, "uv", 2)
-    where = points_of(new)[numbers(new.loops, "vertex_index").astype(int).ravel(), :2]
-    inside = (np.abs(where) < 0.6).all(axis=1)
-    np.testing.assert_allclose(uv[inside], where[inside], atol=1e-5)
+def numbers_in(value):
+    """A value as a list of numbers: of a text those of its letters."""
+    if isinstance(value, str | bytes):
+        return list(value.encode() if isinstance(value, str) else value)
+    return np.reshape(value, -1).astype(float).tolist()
 
 
 def test_the_chosen_maps_and_colours_stay_chosen():
-    obj = cube()
+    data = cube().data
     for name in ("One", "Two"):
-        obj.data.uv_layers.new(name=name)
-        obj.data.color_attributes.new(name=f"Colour {name}", type="BYTE_COLOR", domain="CORNER")
-    obj.data.uv_layers["Two"].active_render = True
-    obj.data.uv_layers.active = obj.data.uv_layers["One"]
-    obj.data.attributes.active_color_name = "Colour Two"
-    obj.data.attributes.default_color_name = "Colour One"
-    new = refined(obj).data
+        data.uv_layers.new(name=name)
+        data.color_attributes.new(name=f"Colour {name}", type="BYTE_COLOR", domain="CORNER")
+    data.uv_layers["Two"].active_render = True
+    data.uv_layers.active = data.uv_layers["One"]
+    data.attributes.active_color_name = "Colour Two"
+    data.attributes.default_color_name = "Colour One"
+    new = refined(bpy.context.object).data
     assert new.uv_layers["Two"].active_render
     assert new.uv_layers.active.name == "One"
     assert new.attributes.active_color_name == "Colour Two"
     assert new.attributes.default_color_name == "Colour One"
 
 
-def test_vertex_groups_are_weighted_by_the_masks():
-    obj = grid(6)
-    left, lock = obj.vertex_groups.new(name="Left"), obj.vertex_groups.new(name="Locked")
-    for vertex in obj.data.vertices:
-        left.add([vertex.index], (vertex.co.x + 1) / 2, "REPLACE")
-    lock.add([0], 0.25, "REPLACE")
-    lock.lock_weight = True
-    new = refined(obj, levels=1, scheme="LOOP")
-    assert [g.name for g in new.vertex_groups] == ["Left", "Locked"]
-    assert [g.lock_weight for g in new.vertex_groups] == [False, True]
-    for vertex in new.data.vertices:
-        weights = {m.group: m.weight for m in vertex.groups}
-        # The weight is linear in x, and so it stays.
-        assert weights.get(0, 0) == pytest.approx((vertex.co.x + 1) / 2, abs=1e-5)
-
-
-def test_weights_that_sum_to_one_go_on_doing_so():
-    obj = grid(6)
-    first, second = (obj.vertex_groups.new(name=name) for name in "ab")
-    rng = np.random.default_rng(1)
-    for vertex in obj.data.vertices:
-        weight = float(rng.random())
-        first.add([vertex.index], weight, "REPLACE")
-        second.add([vertex.index], 1 - weight, "REPLACE")
-    for vertex in refined(obj).data.vertices:
-        assert sum(m.weight for m in vertex.groups) == pytest.approx(1, abs=1e-5)
-
-
-def keyed():
-    """A hill with two shape keys, one driven, one animated."""
+def test_shape_keys_stay_with_all_that_moves_them():
     obj = grid(5)
+    group, *_ = (obj.vertex_groups.new(name=name) for name in ("Mask", "Other"))
+    group.lock_weight = True
+    for vertex in obj.data.vertices:
+        group.add([vertex.index], (vertex.co.x + 1) / 2, "REPLACE")
     obj.shape_key_add(name="Basis")
     up, on = obj.shape_key_add(name="Up"), obj.shape_key_add(name="On")
     for point in up.points:
         point.co.z += 1
-    on.relative_key = up
-    for number, point in enumerate(on.points):
-        point.co.x += 0.1 * math.sin(number)
+    on.relative_key, on.mute, on.vertex_group = up, True, "Mask"
     up.slider_min, up.slider_max, up.value = -2, 3, 0.75
-    on.mute = True
-    on.vertex_group = obj.vertex_groups.new(name="Mask").name
     key = obj.data.shape_keys
-    key.name = "Keys"
+    key["studio"] = {"id": 3, "é": [1.0, 2.0]}
     up.keyframe_insert("value", frame=1)
     driver = on.driver_add("value").driver
-    driver.type = "SUM"
-    variable = driver.variables.new()
-    variable.targets[0].id = obj
-    variable.targets[0].data_path = '["smile"]'
-    obj["smile"] = 0.5
-    return obj
-
-
-def test_shape_keys_keep_names_values_and_ranges():
-    old, new = (o.data.shape_keys.key_blocks for o in _pair(keyed()))
-    assert [b.name for b in new] == [b.name for b in old]
-    for before, after in zip(old, new, strict=True):
-        for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
+    driver.type, obj["smile"] = "SUM", 0.5
+    target = driver.variables.new().targets[0]
+    target.id, target.data_path = obj, '["smile"]'
+    track = key.animation_data.nla_tracks.new()
+    track.strips.new("Strip", 10, key.animation_data.action)
+    new = refined(obj, levels=1, scheme="LOOP")
+    made = new.data.shape_keys
+    for before, after in zip(key.key_blocks, made.key_blocks, strict=True):
+        for name in ("name", "slider_min", "slider_max", "value", "mute", "vertex_group"):
             assert getattr(after, name) == getattr(before, name), name
         assert after.relative_key.name == before.relative_key.name
-
-
-def test_custom_properties_of_shape_keys_are_kept():
-    obj = cube()
-    obj.shape_key_add(name="Basis")
-    obj.data.shape_keys["studio"] = {"id": 3, "é": [1.0, 2.0]}
-    assert refined(obj).data.shape_keys["studio"].to_dict() == {"id": 3, "é": [1.0, 2.0]}
-
-
-def test_a_key_that_lifts_all_by_one_goes_on_doing_so():
-    _, new = _pair(keyed())
-    basis, up = (numbers(b.points, "co", 3) for b in new.data.shape_keys.key_blocks[:2])
-    np.testing.assert_allclose(up - basis, np.tile([0, 0, 1], (len(basis), 1)), atol=1e-5)
-
-
-def test_actions_and_drivers_of_keys_are_kept():
-    old, new = _pair(keyed())
-    data, before = new.data.shape_keys.animation_data, old.data.shape_keys.animation_data
-    assert data.action == before.action
-    if hasattr(data, "action_slot"):
-        assert data.action_slot == before.action_slot
-    (driver,) = data.drivers
-    assert driver.data_path == before.drivers[0].data_path
+    basis, lifted = (numbers(block.points, "co", 3) for block in made.key_blocks[:2])
+    np.testing.assert_allclose(lifted - basis, np.tile([0, 0, 1], (len(basis), 1)), atol=1e-5)
+    assert made["studio"].to_dict() == {"id": 3, "é": [1.0, 2.0]}
+    assert made.animation_data.action == key.animation_data.action
+    (strip,) = made.animation_data.nla_tracks[0].strips
+    assert (strip.name, strip.action, strip.frame_start) == (
+        "Strip",
+        made.animation_data.action,
+        10,
+    )
     # As with Blender's own duplicates, what listened to the object listens to its copy.
-    assert driver.driver.variables[0].targets[0].id == new
-    assert before.drivers[0].driver.variables[0].targets[0].id == old
     new["smile"] = 0.25
     new.update_tag()
     bpy.context.view_layer.update()
-    assert new.data.shape_keys.key_blocks["On"].value == pytest.approx(0.25)
-
-
-def test_tracks_of_keys_are_kept():
-    obj = keyed()
-    data = obj.data.shape_keys.animation_data
-    track = data.nla_tracks.new()
-    track.name = "Track"
-    track.strips.new("Strip", 10, data.action).name = "Strip"
-    _, new = _pair(obj)
-    (copied,) = new.data.shape_keys.animation_data.nla_tracks
-    assert copied.name == "Track"
-    assert [(s.name, s.action, s.frame_start) for s in copied.strips] == [
-        ("Strip", data.action, 10)
+    assert (made.key_blocks["On"].value, on.value) == pytest.approx((0.25, 0.5))
+    # Weights are linear in x, and so they stay.
+    assert [(g.name, g.lock_weight) for g in new.vertex_groups] == [
+        ("Mask", True),
+        ("Other", False),
     ]
+    for vertex in new.data.vertices:
+        weight = sum(member.weight for member in vertex.groups)
+        assert weight == pytest.approx((vertex.co.x + 1) / 2, abs=1e-5)
 
 
-def _pair(obj):
-    return obj, refined(obj)
+def test_materials_parents_modifiers_and_properties_are_those_of_the_object():
+    obj = cube()
+    for name in "abc":
+        obj.data.materials.append(bpy.data.materials.new(name))
+    for number, face in enumerate(obj.data.polygons):
+        face.material_index = number % 3
+    obj.material_slots[1].link = "OBJECT"
+    obj.material_slots[1].material = bpy.data.materials.new("own")
+    other, parent = bpy.data.collections.new("Other"), bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.children.link(other)
+    other.objects.link(obj)
+    obj.parent, obj["tag"], obj.data["mesh tag"] = parent, 3, 4
+    obj.modifiers.new("Bend", "SIMPLE_DEFORM").angle = 1.25
+    obj.constraints.new("COPY_LOCATION")
+    new = refined(obj, levels=1)
+    assert [s.material.name for s in new.material_slots] == ["a", "own", "c"]
+    materials = [face.material_index for face in new.data.polygons]
+    assert materials == np.repeat(np.arange(6) % 3, 4).tolist()
+    assert (new.parent, set(new.users_collection)) == (parent, set(obj.users_collection))
+    assert (new.modifiers["Bend"].angle, len(new.constraints)) == (1.25, 1)
+    assert (new["tag"], new.data["mesh tag"]) == (3, 4)
+
+
+def test_marks_of_edges_stay_on_both_halves_and_creases_wear_off():
+    obj = cube()
+    crease = obj.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+    # Sharp for 3.6 levels, of which 2.6 are left.
+    crease.data.foreach_set("value", np.r_[0.6, np.zeros(11)].astype(np.float32))
+    for edge in (0, 5):
+        obj.data.edges[edge].use_seam = obj.data.edges[edge].use_edge_sharp = True
+    if own := hasattr(obj.data.edges[0], "use_freestyle_mark"):  # an attribute since 5.0
+        obj.data.edges[0].use_freestyle_mark = obj.data.edges[5].use_freestyle_mark = True
+    else:
+        marks = obj.data.attributes.new("freestyle_edge", "BOOLEAN", "EDGE").data
+        marks[0].value = marks[5].value = True
+    new = refined(obj, levels=1, crease_lines=False, scheme="LOOP").data
+    drawn = (
+        [e.use_freestyle_mark for e in new.edges]
+        if own
+        else numbers(new.attributes["freestyle_edge"].data)
+    )
+    ends = {v for edge in (0, 5) for v in obj.data.edges[edge].vertices}
+    for marks in ([e.use_seam for e in new.edges], [e.use_edge_sharp for e in new.edges], drawn):
+        there = [edge for edge, on in zip(new.edges, marks, strict=True) if on]
+        assert len(there) == 4
+        assert {min(edge.vertices) for edge in there} <= ends
+    left = numbers(new.attributes["crease_edge"].data)
+    assert left[left > 0] == pytest.approx([math.sqrt(0.26)] * 2)
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+def test_what_is_in_hidden_faces_is_hidden(levels):
+    mesh = grid(3).data
+    mesh.polygons.foreach_set("hide", [i in (0, 1, 3, 4) for i in range(9)])
+    for rows, hidden in zip((mesh.edges, mesh.vertices), hidden_around(mesh), strict=True):
+        rows.foreach_set("hide", hidden)
+    new = refined(bpy.context.object, levels=levels).data
+    edges, points = hidden_around(new)
+    assert [e.hide for e in new.edges] == edges
+    assert [v.hide for v in new.vertices] == points
+    assert 0 < sum(edges) < len(edges)
+
+
+def hidden_around(mesh):
+    """Masks of the edges, and of the vertices, that have hidden faces alone."""
+    edges, points = [True] * len(mesh.edges), [True] * len(mesh.vertices)
+    for face in mesh.polygons:
+        for corner in [] if face.hide else face.loop_indices:
+            edges[mesh.loops[corner].edge_index] = False
+            points[mesh.loops[corner].vertex_index] = False
+    return edges, points
+
+
+def test_normals_are_the_surfaces_and_turn_with_a_rig():
+    plain = refined(cube(), levels=1).data
+    assert all(p.use_smooth for p in plain.polygons)
+    # A side has one normal up to its corners.
+    assert (np.abs(numbers(plain.corner_normals, "vector", 3)).max(axis=1) > 0.98).all()
+    rig = rigged(grid(4), Bone=(0, lambda x: 1.0))
+    new = refined(bpy.data.objects["Grid"], levels=1)
+    still, at_rest = numbers(evaluated(new).corner_normals, "vector", 3), points_of(evaluated(new))
+    pose = rig.pose.bones["Bone"]
+    pose.rotation_mode, pose.rotation_euler = "XYZ", (math.pi / 2, 0, 0)
+    turned = numbers(evaluated(new).corner_normals, "vector", 3)
+    matrix = np.array(pose.matrix.to_3x3()) @ np.array(pose.bone.matrix_local.to_3x3()).T
+    np.testing.assert_allclose(turned, still @ matrix.T, atol=0.02)
+    np.testing.assert_allclose(points_of(evaluated(new)), at_rest @ matrix.T, atol=1e-5)
+    obj = grid(4, "Custom")
+    obj.data.normals_split_custom_set([(0, 0, 1)] * len(obj.data.loops))
+    custom = numbers(refined(obj).data.corner_normals, "vector", 3)
+    # Blender keeps two angles for each, and takes those whose cosine is above 1 − 10⁻⁴ for none.
+    np.testing.assert_allclose(custom, np.tile([0, 0, 1], (len(custom), 1)), atol=np.sqrt(2e-4))
+
+
+@pytest.mark.parametrize("marks", ["points", "edges"])
+@pytest.mark.parametrize("boundary", ["ALL", "PRESERVE_CORNERS"])
+def test_without_correction_quads_are_those_of_subdivision_surface(boundary, marks):
+    """Suzanne, sharp at no level, at a part of one, at more, and for good, against OpenSubdiv."""
+    bpy.ops.mesh.primitive_monkey_add(calc_uvs=True)
+    obj, kinds = bpy.context.object, [0, 0.25, 0, 0.35, 0.6, 1, 0, 0.2, 0.45]
+    data = obj.data
+    if marks == "points":
+        name, domain = "crease_vert", "POINT"
+        sharp = np.resize(kinds, len(data.vertices))
+    else:
+        name, domain = "crease_edge", "EDGE"
+        ends = numbers(data.edges, "vertices", 2).astype(int)
+        faces = np.bincount(numbers(data.loops, "edge_index").astype(int).ravel())
+        # At boundaries Blender has rules of its own.
+        sharp = np.where(
+            np.isin(ends, ends[faces == 1]).any(axis=1), 0, np.resize(kinds, len(ends))
+        )
+    data.attributes.new(name, "FLOAT", domain).data.foreach_set("value", sharp.astype(np.float32))
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels, modifier.use_limit_surface, modifier.boundary_smooth = 2, False, boundary
+    own = evaluated(obj).copy()
+    obj.modifiers.clear()
+    new = refined(obj, levels=2, budget=0.0, border=boundary, limit=False).data
+    assert [len(p.vertices) for p in new.polygons] == [4] * len(own.polygons)
+    (places, uv), (expected, uv_expected) = corners_of(new), corners_of(own)
+    tree = KDTree(len(expected))
+    for number, place in enumerate(expected):
+        tree.insert(place, number)
+    tree.balance()
+    _, nearest, apart = zip(*(tree.find(place) for place in places), strict=True)
+    assert max(apart) < 1e-5
+    np.testing.assert_allclose(uv, uv_expected[list(nearest)], atol=1e-4)
+
+
+def corners_of(mesh):
+    """Each corner's place, a little towards the middle of its face, and its point of the map."""
+    points = points_of(mesh)[numbers(mesh.loops, "vertex_index").astype(int).ravel()]
+    middle = points.reshape(-1, 4, 3).mean(axis=1)
+    places = 0.9 * points + 0.1 * np.repeat(middle, 4, axis=0)
+    return places, numbers(mesh.uv_layers[0].data, "uv", 2)
+
+
+def test_every_loss_is_named_and_loose_parts_stay():
+    points = [(0, 0, 0), (1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (3, 0, 0), (4, 0, 0)]
+    obj = placed("Many", points, [(0, 1, 2, 3, 4)], [(5, 6)])
+    obj.data.attributes.new("id", "INT", "POINT")
+    obj.data.attributes.new("stress", "FLOAT", "EDGE")
+    obj.data.normals_split_custom_set([(0, 0, 1)] * 5)
+    obj.vertex_groups.new(name="g").add([0], 0.0, "REPLACE")
+    obj.shape_key_add(name="Basis")
+    for kind in ("HOOK", "CLOTH", "MULTIRES", "PARTICLE_SYSTEM"):
+        obj.modifiers.new(kind, kind)
+    new = refined(obj, scheme="LOOP")
+    assert any({*edge.vertices} == {5, 6} for edge in new.data.edges)
+    np.testing.assert_array_equal(points_of(new.data)[5:7], points_of(obj.data)[5:])
+    split = placed("Split", [(0, 0, 0), (1, 0, 0), (0, 1, 0)] * 2, [(0, 1, 2), (3, 4, 5)])
+    text = notes(new) + notes(refined(split))
+    words = "triangles without id stress normals weight masks Hooks CLOTH Multires Particles Merge"
+    assert all(word in text for word in words.split()), text
+
+
+def test_an_edited_mesh_is_refined_as_it_is_edited():
+    obj = cube()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.resize(value=(3, 3, 3))
+    assert bpy.ops.object.pns_refine(levels=1) == {"FINISHED"}
+    assert bpy.context.mode == "OBJECT"
+    assert np.abs(points_of(bpy.context.object.data)).max() > 2.9
+    assert np.abs(points_of(chosen(obj).data)).max() == 3

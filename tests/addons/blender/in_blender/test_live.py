@@ -1,75 +1,67 @@
-"""Live mode: the base stays editable, and what is shown follows."""
+"""Live mode: the base stays editable, and what is shown follows, by a timer that undo ignores."""
 
 import bpy
 import numpy as np
 import pytest
-from live_scene import WATCH, settle, shown, started
-from scene import chosen, cube, evaluated, grid, linked, numbers, points_of, refined
+from scene import (
+    WATCH,
+    chosen,
+    cube,
+    edit,
+    evaluated,
+    grid,
+    linked,
+    numbers,
+    points_of,
+    refined,
+    rigged,
+    settle,
+    shown_here,
+    started,
+)
 
 
-def test_the_result_is_shown_and_the_base_is_kept():
-    obj = started(grid(4))
-    assert len(obj.data.polygons) == 16
-    np.testing.assert_allclose(shown(obj), points_of(refined(grid(4, "Other")).data), atol=1e-6)
+def shown(obj):
+    """The vertices that are shown."""
+    return points_of(evaluated(obj))
 
 
-def test_an_edit_is_followed_by_itself():
-    obj = started(grid(4))
-    before = shown(obj)
-    obj.data.vertices[7].co.z += 1
-    obj.data.update()
+def faces(obj):
+    """The number of faces that are shown."""
+    return len(evaluated(obj).polygons)
+
+
+def by_name():
+    """The object, which undo and files replace."""
+    return bpy.data.objects["Grid"]
+
+
+def in_edit_mode(obj):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0, 2))
     settle()
-    assert np.abs(shown(obj) - before).max() > 0.1
-    expected = grid(4, "Other")
-    expected.data.vertices[7].co.z += 1
-    np.testing.assert_allclose(shown(obj), points_of(refined(expected).data), atol=1e-6)
+    bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_an_edit_in_edit_mode_is_followed():
+@pytest.mark.parametrize("act", [edit, in_edit_mode])
+def test_an_edit_is_followed_by_itself_for_all_that_share_the_mesh(act):
     obj = grid(4)
     # Neither can be read, or written, of a mesh that is edited.
     obj.data.uv_layers.new(name="Map")
     obj.vertex_groups.new(name="Group").add([0, 1], 0.5, "REPLACE")
-    before = shown(started(obj))
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.transform.translate(value=(0, 0, 2))
-    settle()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    settle()
-    np.testing.assert_allclose(shown(obj) - before, np.tile([0, 0, 2], (len(before), 1)), atol=1e-5)
-
-
-def test_an_edit_of_a_shared_mesh_is_followed_whichever_object_is_edited():
-    obj = started(grid(4, "B"))
-    for name in "AC":
-        twin = obj.copy()
-        twin.name = name
-        bpy.context.scene.collection.objects.link(twin)
+    twin = shown_here(started(obj).copy())
+    np.testing.assert_allclose(shown(obj), points_of(refined(obj).data), atol=1e-6)
     before = shown(obj)
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.transform.translate(value=(0, 0, 2))
+    act(chosen(obj))
+    assert len(obj.data.polygons) == 16
+    assert np.abs(shown(obj) - before).max() > 0.1
+    np.testing.assert_allclose(shown(obj), points_of(refined(obj).data), atol=1e-6)
+    np.testing.assert_array_equal(shown(twin), shown(obj))
+    result = obj.data.pns_live.cache.data
+    obj.update_tag()
     settle()
-    np.testing.assert_allclose(shown(obj) - before, np.tile([0, 0, 2], (len(before), 1)), atol=1e-5)
-    bpy.ops.object.mode_set(mode="OBJECT")
-
-
-@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
-def test_it_rests_when_an_edit_was_followed(mode):
-    obj = started(grid(2))
-    bpy.ops.object.mode_set(mode=mode)
-    obj.data.update_tag()
-    for _ in range(100):
-        # As Blender does between two ticks: what a refresh changes is no edit.
-        bpy.context.view_layer.update()
-        if WATCH.run is not None:
-            WATCH.run.finish()
-        if WATCH.advance(quiet=0) is None:
-            break
-    else:
-        raise AssertionError("it never rests")
-    bpy.ops.object.mode_set(mode="OBJECT")
+    assert obj.data.pns_live.cache.data == result, "nothing is refined again without an edit"
 
 
 @pytest.mark.parametrize("pieces", [1, 3, 5, 8])
@@ -88,229 +80,62 @@ def test_an_edit_while_it_is_refreshed_is_followed_too(pieces):
     bpy.ops.mesh.delete(type="VERT")
     bpy.ops.object.mode_set(mode="OBJECT")
     settle()
-    assert len(evaluated(obj).polygons) == 63 * 16
+    assert faces(obj) == 63 * 16
 
 
-def test_nothing_is_refined_again_without_an_edit():
-    obj = started(grid(4))
-    result = obj.data.pns_live.cache.data
-    obj.update_tag()
-    obj.data.update()
-    settle()
-    bpy.ops.object.pns_live_refresh()
-    assert obj.data.pns_live.cache.data == result
-
-
-def test_automatic_refresh_can_be_off():
-    obj = started(grid(4))
-    obj.data.pns_live.automatic = False
+def test_settings_are_followed_on_refresh_and_automatic_refresh_can_be_off():
+    obj = started(cube(), levels=3, scheme="LOOP", automatic=False)
+    assert faces(obj) == 12 * 64
     before = shown(obj)
-    obj.data.vertices[7].co.z += 1
-    obj.data.update()
-    settle()
+    edit(obj)
     np.testing.assert_array_equal(shown(obj), before)
     bpy.ops.object.pns_live_refresh()
     assert np.abs(shown(obj) - before).max() > 0.1
 
 
-def test_settings_are_followed_on_refresh():
-    obj = started(cube(), levels=3, scheme="LOOP")
-    assert len(evaluated(obj).polygons) == 12 * 64
-
-
-def test_an_armature_bends_what_is_shown():
+def test_rigs_and_shape_keys_move_what_is_shown_without_a_refresh():
     obj = grid(6)
-    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(rig)
-    chosen(rig)
-    bpy.ops.object.mode_set(mode="EDIT")
-    for name, x in (("Still", 0), ("Moving", 1)):
-        bone = rig.data.edit_bones.new(name)
-        bone.head, bone.tail = (x, 0, 0), (x, 0, 1)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for name, sign in (("Still", -1), ("Moving", 1)):
-        group = obj.vertex_groups.new(name=name)
-        for vertex in obj.data.vertices:
-            group.add([vertex.index], (1 + sign * vertex.co.x) / 2, "REPLACE")
-    obj.modifiers.new("Armature", "ARMATURE").object = rig
+    rig = rigged(obj, Still=(0, lambda x: (1 - x) / 2), Moving=(1, lambda x: (1 + x) / 2))
     started(obj, scheme="LOOP")
     rest = shown(obj)
     rig.pose.bones["Moving"].location = (0, 2, 0)
-    bpy.context.view_layer.update()
-    moved = shown(obj) - rest
     # Weights are linear in x and go by Loop's masks, as points do: what they move is linear too.
     inner = np.abs(rest[:, :2]).max(axis=1) < 0.7
-    np.testing.assert_allclose(moved[inner, 2], 1 + rest[inner, 0], atol=1e-5)
+    np.testing.assert_allclose((shown(obj) - rest)[inner, 2], 1 + rest[inner, 0], atol=1e-5)
     assert [m.name for m in obj.modifiers] == ["PNS Live", "Armature"]
-
-
-def test_it_survives_saving_and_opening_again(tmp_path):
-    before = shown(started(grid(4)))
-    path = str(tmp_path / "live.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    obj = bpy.data.objects["Grid"]
-    np.testing.assert_array_equal(shown(obj), before)
-    obj.data.vertices[7].co.z += 1
+    obj = grid(4, "Keyed")
+    obj.shape_key_add(name="Basis")
+    raised = obj.shape_key_add(name='A "key"')
+    raised.points[7].co.z += 1
+    raised.value = 0
+    below = shown(started(obj))
+    raised.value = 0.5
     obj.data.update()
-    settle()
-    assert np.abs(shown(obj) - before).max() > 0.1
+    basis, lifted = (
+        numbers(block.points, "co", 3) for block in refined(obj).data.shape_keys.key_blocks
+    )
+    assert (lifted - basis)[7, 2] > 0.4
+    np.testing.assert_allclose(shown(obj) - below, 0.5 * (lifted - basis), atol=1e-6)
 
 
-def test_a_duplicate_gets_a_result_of_its_own():
-    obj = started(grid(4))
-    before = shown(obj)
-    twin = obj.copy()
-    twin.data = obj.data.copy()
-    bpy.context.scene.collection.objects.link(twin)
-    np.testing.assert_array_equal(shown(twin), before)
-    twin.data.vertices[7].co.z += 1
-    twin.data.update()
-    settle()
-    np.testing.assert_array_equal(shown(obj), before)
-    assert np.abs(shown(twin) - before).max() > 0.1
-    assert twin.data.pns_live.cache != obj.data.pns_live.cache
-
-
-def test_linked_data_shares_the_result():
-    obj = started(grid(4))
-    twin = obj.copy()
-    bpy.context.scene.collection.objects.link(twin)
-    obj.data.vertices[7].co.z += 1
-    obj.data.update()
-    settle()
-    np.testing.assert_array_equal(shown(twin), shown(obj))
-
-
-def test_an_appended_copy_stays_out_of_the_scene(tmp_path):
-    started(grid(4))
-    path = str(tmp_path / "live.blend")
+def test_it_survives_saving_appending_and_duplication(tmp_path):
+    before, path = shown(started(grid(4))), str(tmp_path / "live.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
     bpy.ops.wm.append(directory=f"{path}/Object/", filename="Grid")
     settle()
     assert [obj.name for obj in bpy.context.scene.objects] == ["Grid"]
-    assert len(evaluated(bpy.data.objects["Grid"]).polygons) == 16 * 16
-
-
-def test_apply_wants_object_mode():
-    obj = started(cube())
-    bpy.ops.object.mode_set(mode="EDIT")
-    with pytest.raises(RuntimeError, match="Object Mode"):
-        bpy.ops.object.pns_live_apply()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert obj.modifiers
-
-
-def test_apply_gives_the_result_for_good():
-    obj = started(cube())
-    before = shown(obj)
-    bpy.ops.object.pns_live_apply()
-    assert not obj.modifiers
-    np.testing.assert_allclose(points_of(obj.data), before, atol=1e-6)
-    assert not obj.data.pns_live.enabled
-    assert obj.data.name == "Cube"
-    assert len(bpy.data.objects) == 1
-    assert not bpy.data.node_groups
-
-
-def test_remove_leaves_the_base():
-    obj = started(cube())
-    bpy.ops.object.pns_live_remove()
-    assert len(evaluated(obj).polygons) == 6
-    assert not obj.modifiers
-    assert len(bpy.data.objects) == len(bpy.data.meshes) == 1
-    assert not bpy.data.node_groups
-
-
-def removed_by_hand(obj):
-    obj.modifiers.remove(obj.modifiers["PNS Live"])
-
-
-def applied_by_hand(obj):
-    bpy.ops.object.modifier_apply(modifier="PNS Live")
-
-
-def deleted(obj):
-    bpy.ops.object.delete()
-
-
-@pytest.mark.parametrize("end", [removed_by_hand, applied_by_hand])
-def test_what_is_no_more_shown_is_not_told_of(end):
-    obj = started(cube())
-    assert bpy.ops.object.pns_overlay.poll()
-    end(obj)
-    assert not bpy.ops.object.pns_overlay.poll()
-    assert bpy.ops.object.pns_live_add.poll()
-
-
-@pytest.mark.parametrize("end", [removed_by_hand, applied_by_hand, deleted])
-def test_what_is_no_more_shown_is_not_saved(end, tmp_path):
-    end(started(cube()))
-    path = str(tmp_path / "live.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
+    assert faces(by_name()) == 16 * 16
     bpy.ops.wm.open_mainfile(filepath=path)
-    left = [] if end is deleted else ["Cube"]
-    assert [block.name for block in (*bpy.data.objects, *bpy.data.meshes)] == left * 2
-
-
-def test_a_modifier_with_another_name_is_followed():
-    obj = started(grid(4))
-    obj.modifiers["PNS Live"].name = "Smooth"
-    before = shown(obj)
-    obj.data.vertices[7].co.z += 1
-    obj.data.update()
-    settle()
-    assert np.abs(shown(obj) - before).max() > 0.1
-    bpy.ops.object.pns_live_remove()
-    assert not obj.modifiers
-
-
-def test_a_modifier_with_nodes_of_its_user_s_own_is_the_user_s(tmp_path, capfd):
-    obj = started(cube())
-    nodes = bpy.data.node_groups.new("Mine", "GeometryNodeTree")
-    obj.modifiers["PNS Live"].node_group = nodes
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
-    assert "Traceback" not in capfd.readouterr().err
-    assert list(bpy.data.objects) == [obj]
-    bpy.ops.object.pns_live_add()
-    bpy.ops.object.pns_live_remove()
-    assert [modifier.node_group for modifier in obj.modifiers] == [nodes]
-
-
-def test_an_object_with_the_modifier_of_another_is_live_once_it_is_refreshed():
-    obj, other = started(grid(4)), cube("Other")
-    chosen(obj)
-    other.select_set(True)
-    bpy.ops.object.make_links_data(type="MODIFIERS")
-    chosen(other)
-    bpy.ops.object.pns_live_refresh()
-    before = shown(other)
-    assert len(evaluated(other).polygons) == 6 * 16
-    other.data.vertices[0].co.z += 1
-    other.data.update()
-    settle()
-    assert np.abs(shown(other) - before).max() > 0.1
-
-
-def test_shape_keys_move_what_is_shown_without_a_refresh():
-    obj = grid(4)
-    obj.shape_key_add(name="Basis")
-    raised = obj.shape_key_add(name='A "key"')
-    raised.points[7].co.z += 1
-    raised.value = 0
-    started(obj)
-    below = shown(obj)
-    raised.value = 0.5
-    obj.data.update()
-    keys = refined(obj).data.shape_keys.key_blocks
-    offset = numbers(keys[1].points, "co", 3) - numbers(keys[0].points, "co", 3)
-    assert offset[7, 2] > 0.4
-    np.testing.assert_allclose(shown(obj) - below, 0.5 * offset, atol=1e-6)
-    raised.points[7].co.z += 1
-    obj.data.update()
-    settle()
-    np.testing.assert_allclose(shown(obj) - below, offset, atol=1e-6)
+    obj = by_name()
+    np.testing.assert_array_equal(shown(obj), before)
+    twin = obj.copy()
+    twin.data = obj.data.copy()
+    shown_here(twin)
+    np.testing.assert_array_equal(shown(twin), before)
+    edit(twin)
+    np.testing.assert_array_equal(shown(obj), before)
+    assert np.abs(shown(twin) - before).max() > 0.1
 
 
 def test_renders_have_levels_of_their_own():
@@ -319,36 +144,169 @@ def test_renders_have_levels_of_their_own():
     for name in ("render_init", "render_cancel", "render_init", "render_complete"):
         for handler in getattr(bpy.app.handlers, name):
             handler(bpy.context.scene)
-        count = len(evaluated(obj).polygons)
-        assert count == 16 * 4 ** (3 if name == "render_init" else 1)
+        assert faces(obj) == 16 * 4 ** (3 if name == "render_init" else 1)
     np.testing.assert_array_equal(shown(obj), before)
 
 
-def test_a_linked_object_is_refused_in_words(tmp_path):
-    obj = linked(cube(), tmp_path / "library.blend")
-    with pytest.raises(RuntimeError, match="Linked from another file"):
-        bpy.ops.object.pns_live_add()
-    # An override can be changed, and its mesh cannot, which holds the settings.
-    override = obj.override_create()
-    bpy.context.scene.collection.objects.link(override)
-    chosen(override)
-    with pytest.raises(RuntimeError, match="Linked from another file"):
-        bpy.ops.object.pns_live_add()
+# --- its end --------------------------------------------------------------------------------------
 
 
-def test_what_a_linked_object_shows_is_its_files(tmp_path):
-    obj = linked(started(cube()), tmp_path / "library.blend")
-    assert len(evaluated(obj).polygons) == 6 * 16
-    for name in ("refresh", "apply", "remove"):
-        with pytest.raises(RuntimeError, match="Linked from another file"):
-            getattr(bpy.ops.object, f"pns_live_{name}")()
+@pytest.mark.parametrize(("end", "count"), [("apply", 96), ("remove", 6)])
+def test_it_ends_without_a_trace(end, count):
+    obj = started(cube())
+    before = shown(obj)
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="Object Mode"):
+        bpy.ops.object.pns_live_apply()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    getattr(bpy.ops.object, f"pns_live_{end}")()
+    assert (faces(obj), len(obj.data.polygons), obj.data.name) == (count, count, "Cube")
+    if end == "apply":
+        np.testing.assert_allclose(shown(obj), before, atol=1e-6)
+    assert not any((obj.modifiers, obj.data.pns_live.enabled, bpy.data.node_groups))
+    assert len(bpy.data.objects) == 1
 
 
-def test_a_deleted_object_is_forgotten_quietly():
-    obj = started(grid(4))
-    obj.data.vertices[7].co.z += 1
-    obj.data.update()
-    bpy.context.view_layer.update()
-    bpy.data.objects.remove(obj)
+@pytest.mark.parametrize("keep", [True, False])
+def test_what_is_refined_shows_its_own_mesh_and_no_longer_a_live_one(keep):
+    obj = started(grid(2))
+    bpy.ops.object.pns_overlay(shown="pns_gate")
+    new = refined(obj, levels=1, keep_original=keep)
+    assert faces(new) == len(new.data.polygons) == 16
+    assert not any((new.modifiers, new.data.pns_live.enabled))
+    assert faces(obj) == (4 * 16 if keep else 16)
+    # The base, its copy's two holders; or the object alone.
+    assert len(bpy.data.objects) == (4 if keep else 1)
+
+
+ENDS = {
+    "removed": lambda obj: obj.modifiers.remove(obj.modifiers["PNS Live"]),
+    "applied": lambda obj: bpy.ops.object.modifier_apply(modifier="PNS Live"),
+    "deleted": lambda obj: bpy.ops.object.delete(),
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_what_is_no_more_shown_is_neither_told_of_nor_saved(end, tmp_path):
+    obj = started(cube())
+    edit(obj, settled=False)
+    assert bpy.ops.object.pns_overlay.poll()
+    ENDS[end](obj)
+    assert not bpy.ops.object.pns_overlay.poll()
     settle()
-    assert WATCH.run is None
+    path = str(tmp_path / "live.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    left = [] if end == "deleted" else ["Cube"]
+    assert [block.name for block in (*bpy.data.objects, *bpy.data.meshes)] == left * 2
+
+
+def test_modifiers_are_told_by_their_nodes_and_not_by_their_names(tmp_path):
+    obj, other = started(grid(4)), cube("Other")
+    obj.modifiers["PNS Live"].name = "Smooth"
+    before = shown(obj)
+    edit(obj)
+    assert np.abs(shown(obj) - before).max() > 0.1
+    # One with the modifier of another is live once it is refreshed.
+    chosen(obj)
+    other.select_set(True)
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    chosen(other)
+    bpy.ops.object.pns_live_refresh()
+    assert faces(other) == 6 * 16
+    # What has nodes of its user's own is the user's.
+    other.modifiers[0].name = "PNS Live"
+    other.modifiers[0].node_group = bpy.data.node_groups.new("Mine", "GeometryNodeTree")
+    bpy.ops.object.pns_live_add()
+    bpy.ops.object.pns_live_remove()
+    assert [modifier.node_group.name for modifier in other.modifiers] == ["Mine"]
+
+
+def test_what_is_linked_is_refused_in_words(tmp_path):
+    obj = linked(started(cube()), tmp_path / "live.blend")
+    assert faces(obj) == 6 * 16
+    linked(cube(), tmp_path / "plain.blend")
+    # An override can be changed, and its mesh cannot, which holds the settings.
+    shown_here(bpy.context.object.override_create())
+    with pytest.raises(RuntimeError, match="Linked from another file"):
+        bpy.ops.object.pns_live_add()
+    obj = linked(started(cube("Other")), tmp_path / "other.blend")
+    for act in ("refresh", "apply", "remove"):
+        with pytest.raises(RuntimeError, match="Linked from another file"):
+            getattr(bpy.ops.object, f"pns_live_{act}")()
+
+
+# --- undo -----------------------------------------------------------------------------------------
+
+
+def pushed(*acts):
+    """Push a step of undo after each act."""
+    bpy.context.preferences.edit.use_global_undo = True
+    for act in acts:
+        act()
+        bpy.ops.ed.undo_push(message="step")
+
+
+def test_undo_frees_nothing_that_is_shown_and_takes_edits_back():
+    obj = started(grid(4))
+    before = shown(obj)
+
+    def change():
+        obj.data.materials.append(bpy.data.materials.new("Young"))
+        edit(obj, settled=False)
+
+    # The step is made with the edit, and the refresh comes after it.
+    pushed(settle, change)
+    settle()
+    after = shown(obj)
+    for take, expected, materials in (("undo", before, []), ("redo", after, ["Young"])):
+        getattr(bpy.ops.ed, take)()
+        mesh = by_name().data.pns_live.cache.data
+        assert mesh in bpy.data.meshes[:]
+        assert all(m is None or m in bpy.data.materials[:] for m in mesh.materials)
+        settle()
+        np.testing.assert_allclose(shown(by_name()), expected, atol=1e-6)
+        assert [m.name for m in evaluated(by_name()).materials] == materials
+
+
+@pytest.mark.parametrize("pieces", [1, 8, 12])
+def test_undo_while_it_is_refreshed_is_followed(pieces):
+    obj = started(grid(4))
+    before = shown(obj)
+    pushed(settle, lambda: edit(obj, settled=False))
+    bpy.context.view_layer.update()
+    WATCH.advance(quiet=0)
+    for _ in range(pieces):
+        WATCH.run.advance(0)
+    bpy.ops.ed.undo()
+    settle()
+    np.testing.assert_allclose(shown(by_name()), before, atol=1e-6)
+    assert len(bpy.data.meshes) == 3
+
+
+def test_undo_brings_back_what_was_removed_by_hand_and_saved(tmp_path):
+    obj = started(grid(4))
+    before = shown(obj)
+    pushed(settle, lambda: ENDS["removed"](obj))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.ed.undo()
+    settle()
+    np.testing.assert_allclose(shown(by_name()), before, atol=1e-6)
+
+
+def test_undo_of_a_duplicates_edit_shows_the_common_result_again():
+    obj = grid(4)
+    obj.data.materials.append(bpy.data.materials.new("Own"))
+    before = shown(started(obj))
+    bpy.ops.object.duplicate()
+    twin = bpy.context.object
+    pushed(settle, lambda: edit(twin, settled=False))
+    settle()
+    # Undo counts the users of what is kept, dead or alive, before it tells that it is done.
+    for handler in bpy.app.handlers.undo_pre:
+        handler(bpy.context.scene)
+    assert twin.modifiers[0].node_group is twin.data.pns_live.cache is None
+    assert list(obj.data.pns_live.cache.data.materials) == [None]
+    bpy.ops.ed.undo()
+    settle()
+    np.testing.assert_allclose(shown(bpy.data.objects["Grid.001"]), before, atol=1e-6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 from tests.support.meshes import icosphere
-from train.data.primitives import cylinder
 
 MODEL = load_model("paper")
 OPTIONS = [
@@ -51,7 +51,9 @@ def test_creases_are_found_in_each_mesh_by_itself(
     options: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The rims and walls of a cylinder of six sides are sharp, and a sphere has no such edge."""
-    shapes = [cylinder(6), *(Mesh(*icosphere(2)) for _ in range(4))]
+    cylinder = trimesh.creation.cylinder(1.0, 2.0, sections=6)
+    drum = Mesh(cylinder.vertices, cylinder.faces)
+    shapes = [drum, *(Mesh(*icosphere(2)) for _ in range(4))]
     data = files.glb(*([{"POSITION": m.vertices, "indices": m.faces}] for m in shapes))
     asked = Options(levels=2, **options)
 

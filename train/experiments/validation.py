@@ -25,18 +25,15 @@ from train.baselines.controls import flat, n1
 from train.baselines.neural_subdivision import neural_subdivision
 from train.baselines.pn_triangles import pn_triangles
 from train.data.pairs.polygons import REMESHERS
-from train.data.pairs.references import Pair, Reference
 from train.data.sharp_labels import coarse_sharp_edges
 from train.data.simplifiers import SIMPLIFIERS
 from train.data.validation import Drawn, coarse_mesh, read_shape, validation_meshes
-from train.experiments.beyond.models import models_and_assets
-from train.experiments.harness.experiment import Experiment, Outcome, column, table
-from train.experiments.harness.laboratory import Laboratory
+from train.experiments.harness.experiment import column, table
 from train.experiments.harness.reproduce import formatted
 from train.metrics.self_intersection import crossing_faces
 from train.metrics.surface_distance import SurfaceErrors, gain, prepared, surface_errors
 from train.metrics.whole_surface import normal_jump
-from train.refining import AnyScheme, refine
+from train.refining import refine
 
 LEVELS, SAMPLES = 2, 5000
 
@@ -47,19 +44,6 @@ CATMULL_CLARK = "Catmull–Clark"
 SPLIT = 40.0
 
 ALL = "all"
-
-NOTE = (
-    "Each dense shape is simplified to three coarse meshes, by three of six simplifiers, to about "
-    f"700 or 2,500 faces, refined at {LEVELS} levels, the library's schemes onto the "
-    "limit surface, and compared with the dense mesh both ways: "
-    f"distances of {SAMPLES:,} points evenly by area, the largest also of all vertices, and angles "
-    "between normals. A number is the mean over meshes of the improvement over Loop. *Excess* is "
-    "how far the largest angle between neighbouring faces exceeds the dense mesh's own, mean in "
-    "degrees. *Crossing* is the number of faces that pass through others, over the larger of "
-    "Loop's and the control mesh's, summed. *Precision* and *recall* are of the coarse edges that "
-    "are sharp in truth, on parts and buildings. *Neural Subdivision* has the form of Liu et al. "
-    "2020, trained on the default model's stream."
-)
 
 
 @dataclass(frozen=True)
@@ -99,11 +83,14 @@ class ZeroNetworks:
 class Contender:
     """A method, and the edges of a coarse mesh that it takes for sharp, if it takes any.
 
-    Where it refines triangles alone, polygons are `cut` for it.
+    Attributes:
+        limit: whether its results are put on the base scheme's limit surface.
+        cut: whether polygons are cut into triangles for it.
     """
 
-    scheme: AnyScheme
+    scheme: Scheme
     sharp: Callable[[Mesh], Int[np.ndarray, "N 2"]] | None = None
+    limit: bool = False
     cut: bool = False
 
 
@@ -111,7 +98,7 @@ def contenders(model: Model) -> dict[str, Contender]:
     """Return all methods by the names of the table, Loop first."""
     ours, zero = pns(model), pns(ZeroNetworks(model))
     return {
-        LOOP: Contender(loop()),
+        LOOP: Contender(loop(), limit=True),
         FLAT: Contender(flat()),
         "PN triangles, 40°": Contender(
             pn_triangles(SPLIT), partial(found_sharp_edges, angle=SPLIT)
@@ -119,8 +106,8 @@ def contenders(model: Model) -> dict[str, Contender]:
         "Butterfly": Contender(modified_butterfly()),
         "N1": Contender(n1()),
         "Neural Subdivision": Contender(neural_subdivision()),
-        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
-        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
+        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero), limit=True),
+        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours), limit=True),
     }
 
 
@@ -128,10 +115,10 @@ def polygon_contenders(model: Model) -> dict[str, Contender]:
     """Return the methods for polygons, Catmull–Clark first."""
     ours, zero = pns(model), pns(ZeroNetworks(model))
     return {
-        CATMULL_CLARK: Contender(catmull_clark()),
+        CATMULL_CLARK: Contender(catmull_clark(), limit=True),
         FLAT: Contender(flat(), cut=True),
-        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero)),
-        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours)),
+        ZERO: Contender(zero, partial(found_sharp_edges, scheme=zero), limit=True),
+        OURS: Contender(ours, partial(found_sharp_edges, scheme=ours), limit=True),
     }
 
 
@@ -177,28 +164,10 @@ class Summary:
     recall: float | None = column("Recall", ".2f")
 
 
-@dataclass(frozen=True, slots=True)
-class EachRow:
-    """One method on one coarse mesh."""
-
-    mesh: str = column("Mesh")
-    kind: str = column("Kind")
-    simplifier: str = column("Simplifier")
-    faces: int = column("Faces", "d")
-    method: str = column("Method")
-    mean: float = column("Mean distance", ".3g")
-    p95: float = column("95th percentile", ".3g")
-    largest: float = column("Largest", ".3g")
-    normal: float = column("Normals", ".4f")
-    excess: float = column("Excess °", ".1f")
-    crossing: int = column("Crossing", "d")
-
-
 def measured(drawn: Sequence[Drawn], methods: Mapping[str, Contender]) -> list[Measured]:
     """Measure all methods on coarse meshes of one shape."""
     shape = read_shape(drawn[0].path, drawn[0].kind)
     true, turn = prepared(shape.mesh, SAMPLES), normal_jump(shape.mesh)
-    surface = Reference(true.points, true.normals[true.faces])
     rows = []
     for each in drawn:
         coarse = coarse_mesh(shape, each)
@@ -206,12 +175,10 @@ def measured(drawn: Sequence[Drawn], methods: Mapping[str, Contender]) -> list[M
             continue
         sharp = None
         if shape.sharp is not None:
-            sharp = coarse_sharp_edges(Pair(shape.kind, coarse, surface, shape.sharp))
+            sharp = coarse_sharp_edges(coarse, shape.sharp)
         for name, method in methods.items():
             control = coarse.triangulated() if method.cut else coarse
-            # The library's schemes as they are written by default, on their limit surface.
-            limit = isinstance(method.scheme, Scheme)
-            mesh = refine(control, method.scheme, LEVELS, limit=limit).mesh.triangulated()
+            mesh = refine(control, method.scheme, LEVELS, limit=method.limit).mesh.triangulated()
             rows.append(
                 Measured(
                     shape.name,
@@ -221,7 +188,7 @@ def measured(drawn: Sequence[Drawn], methods: Mapping[str, Contender]) -> list[M
                     name,
                     surface_errors(true, prepared(mesh, SAMPLES)),
                     float(np.degrees(max(normal_jump(mesh) - turn, 0.0))),
-                    crossing_faces(mesh),
+                    int(crossing_faces(mesh).sum()),
                     *_counted(coarse, method, sharp),
                 )
             )
@@ -324,35 +291,3 @@ def validate_command(
             for cell, each in zip(cells, made.columns, strict=True)
         ]
         console.print(f"{texts[0]:22} {texts[2]:22}" + "".join(f"{t[:10]:>11}" for t in texts[3:]))
-
-
-def run(laboratory: Laboratory) -> Outcome:
-    """Measure on the folder `dense` of the assets."""
-    assert laboratory.assets is not None  # needs_assets
-    most = min(laboratory.scale.instances, len(validation_meshes(laboratory.assets / "dense")))
-    rows = validate(laboratory.assets / "dense", None, most)
-    return Outcome(
-        (
-            table("validation", "Simplified shapes", Summary, summary(rows)),
-            table("validation_each", "Each mesh", EachRow, map(_row, rows)),
-        ),
-        notes=(NOTE,),
-    )
-
-
-def _row(row: Measured) -> EachRow:
-    errors = row.errors
-    distances = errors.mean, errors.p95, errors.hausdorff, errors.normal
-    place = row.mesh, row.kind, row.simplifier, row.faces, row.method
-    return EachRow(*place, *distances, row.excess, row.crossing)
-
-
-EXPERIMENT = Experiment(
-    name="validation",
-    title="Simplified shapes: validation",
-    source="Beyond the paper. The validation set, on which the default model is chosen.",
-    run=run,
-    seconds=400,
-    needs_assets=True,
-    reads=models_and_assets,
-)

@@ -1,1 +1,0 @@
-"""Tables and figures of what the paper leaves open: the bundled models, real meshes, stars."""
