@@ -206,5 +206,5 @@ def printable(text: str) -> str:
 def quoted(data: bytes | memoryview) -> str:
     """Return a file's first characters, or its first bytes where these are no text."""
     start = bytes(data[:8])
-    text = start.decode("latin-1")
-    return repr(text) if text.isascii() and text.isprintable() else start.hex(" ")
+    text = b" ".join(start.split()).decode("latin-1")
+    return repr(text) if text.isascii() and text.isprintable() and text else start.hex(" ")

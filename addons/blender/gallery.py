@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent
 PICTURES = {
     "hero": "meshes/spot.obj --looks clay zebra --turn 150",
     "sheet": "meshes/fish.obj --looks clay zebra wire distance ratio --turn 125",
-    "subsurf": "suzanne cube cylinder meshes/spot.obj --looks clay --turn 30 "
+    "subsurf": "suzanne cube cylinder cone meshes/spot.obj --looks clay --turn 30 "
     "--variants control subsurf pns --levels 2 --cell 240 --samples 16",
     "part": "part --looks clay zebra distance --turn -20",
 }

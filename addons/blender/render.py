@@ -2,9 +2,9 @@
 
 PYTHON addons/blender/render.py MESH… -o SHEET.png [--looks clay zebra] [--levels 3]
 
-MESH is a file, or suzanne, cube or cylinder. PYTHON has bpy and the project's library. Several
-meshes make several rows of each look. The camera, the light and the scale of a row are fixed, so
-its cells can be compared.
+MESH is a file, or suzanne, cube, cylinder or cone. PYTHON has bpy and the project's library.
+Several meshes make several rows of each look. The camera, the light and the scale of a row are
+fixed, so its cells can be compared.
 """
 
 from __future__ import annotations

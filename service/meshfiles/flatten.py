@@ -92,10 +92,12 @@ def flatten(
     parents, hidden = _scene_nodes(upload.tree)
     shown = check_copies(upload, faces, limits)
     worlds = _world_matrices(upload.tree["nodes"], parents)
-    placed, nodes = list[MeshFile](), list[str]()
+    placed, nodes, turned = list[MeshFile](), list[str](), 0
     for node, mesh in shown:
         weights = _shown_weights(upload.document, node, mesh)
         joints = joint_matrices(upload, node, worlds)
+        shaded = any("NORMAL" in each.primitive.attributes for each in primitives[mesh])
+        turned += shaded and joints is not None
         name = str(upload.tree["nodes"][node].get("name", f"node {node}"))
         for copy in _copies(upload, node):
             matrix = worlds[node] @ copy
@@ -105,9 +107,13 @@ def flatten(
     names = [set(s.primitive.attributes) for _, mesh in shown for s in primitives[mesh]]
     changes = _changes(upload.tree, len(placed), names, kind)
     left = {n for n, node in enumerate(upload.document.nodes) if node.mesh in primitives}
+    # A format without normals has named them already.
+    room = FORMATS[kind].layers
+    turned *= room is None or NORMAL in room
     for what, count in (
         ("hidden nodes", len(left & hidden)),
         ("nodes outside of the default scene", len(left - worlds.keys())),
+        ("normals of skinned meshes", turned),
     ):
         if count:
             changes.append(Change("/nodes", f"{what} left out", count))

@@ -216,6 +216,10 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     for name in mesh.layers.keys() - layers.keys():
         partly = form.layers is None or name in form.layers
         lost[shown(name) + " that not all corners have" * partly] = 1
+    if COLOUR in layers and layers[COLOUR].values.dtype.itemsize == 2:
+        # Whole numbers are bytes to readers of these formats.
+        words = as_fractions(layers[COLOUR].values).astype(np.float32)
+        layers[COLOUR] = replace(layers[COLOUR], values=words)
     if kind == "obj" and COLOUR in layers:
         colours = as_fractions(layers[COLOUR].values)
         if (colours[:, 3:] < 1).any():

@@ -82,6 +82,9 @@ def _mesh(
     if widths[COLOUR] not in (0, 3, 4):
         lost["values of vertices"] = len(table)
         del parts[COLOUR]
+    elif widths[NORMAL] and widths[COLOUR] and _is_colour_first(parts[NORMAL], parts[COLOUR]):
+        both = np.hstack([parts[NORMAL], parts[COLOUR]])
+        parts[COLOUR], parts[NORMAL] = both[:, :-3], both[:, -3:]
     face_values: dict[str, np.ndarray] = {}
     if of_faces is None:
         lost["colours of faces"] = len(sizes)
@@ -102,6 +105,15 @@ def _mesh(
         face_values=face_values,
         changes=dropped(lost),
     )
+
+
+def _is_colour_first(normals: np.ndarray, colours: np.ndarray) -> bool:
+    """Return whether normals and colours stand in MeshLab's order, which is not Geomview's.
+
+    No colour is negative, and no normal has whole numbers beyond 1.
+    """
+    whole = (normals == np.rint(normals)).all() and (normals > 1).any()
+    return bool(whole or (colours < 0).any())
 
 
 def _of_binary(data: bytes, at: int, prefix: bytes) -> MeshFile:
@@ -258,11 +270,11 @@ def write_off(mesh: MeshFile) -> bytes:
     kept = {name: mesh.layers[name] for name in (NORMAL, COLOUR, UV) if name in mesh.layers}
     prefix = f"{'ST' * (UV in kept)}{'C' * (COLOUR in kept)}{'N' * (NORMAL in kept)}"
     columns, form = [mesh.vertices], f"{NUMBER} {NUMBER} {NUMBER}"
-    for layer in kept.values():
+    for name, layer in kept.items():
         values = np.zeros((len(mesh.vertices), layer.values.shape[1]))
         values[mesh.corners] = layer.values[layer.rows]
         columns.append(values)
-        form += _form(layer.values) * values.shape[1]
+        form += (_form(layer.values) if name == COLOUR else f" {NUMBER}") * values.shape[1]
     pieces = [f"{prefix}OFF\n{len(mesh.vertices)} {len(mesh.sizes)} 0\n".encode()]
     pieces += rows_text(f"{form}\n", np.hstack(columns))
     colours = mesh.face_values.get(COLOUR)
@@ -277,5 +289,6 @@ def write_off(mesh: MeshFile) -> bytes:
     return b"".join(pieces)
 
 
-def _form(values: np.ndarray) -> str:
-    return " %d" if values.dtype.kind in "ui" else f" {NUMBER}"
+def _form(colours: np.ndarray) -> str:
+    """Return how components are written: a fraction with its point, since 1 is one of 255."""
+    return " %d" if colours.dtype.kind in "ui" else " %#.12g"

@@ -10,6 +10,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from pns_common import load_model
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
 from tests.support.shared import SHARED
@@ -43,10 +44,9 @@ def main(python):
             continue
         with tempfile.TemporaryDirectory() as folder:
             refined = Path(folder) / scene.asset
-            options = Options(levels=LEVELS, scheme="loop")
-            refined.write_bytes(
-                subdivide_gltf(source.read_bytes(), "glb", options, None, Limits()).glb
-            )
+            options, limits = Options(levels=LEVELS), Limits()
+            made = subdivide_gltf(source.read_bytes(), "glb", options, load_model(), limits)
+            refined.write_bytes(made.glb)
             before, after = render(python, scene, [source, refined])
         check(scene, before, after)
         print(f"{scene.asset}: {before['faces']} faces, {after['faces']} refined: {scene.picture}")

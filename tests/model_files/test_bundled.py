@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
-from pns_common import Mesh, ModelError, pns, sharp_edges, subdivide
+from pns_common import Mesh, ModelError, clean, pns, sharp_edges, subdivide
 from pns_common.model import file as model_file
 from pns_common.model.file import (
     BUNDLED,
@@ -127,3 +128,19 @@ def test_rims_of_a_drum_stay_sharp_where_loops_run_around_it():
     assert sorted(sharp.tolist()) == sorted(expected)
     moved = subdivide(mesh, levels=1).vertices[:36] - rings
     assert np.linalg.norm(moved, axis=1).max() < 0.03
+
+
+def test_the_hull_of_a_disc_and_a_box_keeps_its_steep_edges():
+    # Such hulls stand for a robot's parts: none of their edges is marked by a loop of faces.
+    turn = 2 * np.pi * np.arange(24) / 24
+    disc = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    box = [[x, y, z] for x in (0.5, 2) for y in (-0.6, 0.6) for z in (0, 1)]
+    hull = ConvexHull(np.concatenate([1.2 * disc, disc + np.array([0, 0, 0.6]), box]))
+    a, b, c = hull.points[hull.simplices].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0
+    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    mesh = clean(Mesh(hull.points, faces)).mesh
+    steep, kept = sharp_edges(mesh, 60), sharp_edges(mesh, scheme=pns(load_model()))
+    assert len(steep) > 15
+    assert {*map(frozenset, steep.tolist())} <= {*map(frozenset, kept.tolist())}

@@ -37,6 +37,11 @@ const AMISS = {
 const HEADER = (format) =>
   `ply\nformat ${format} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n` +
   "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+/** Pictures of one pixel. */
+const DOTS = {
+  "red one.png": "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR42mP4wMEBAALsAQEtiZ/+AAAAAElFTkSuQmCC",
+  "green.png": "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR42mPg+MABAAIEAQFtP73zAAAAAElFTkSuQmCC",
+};
 const PLACES = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]];
 /** One square, first as two triangles. */
 const SQUARES = {
@@ -163,6 +168,26 @@ describe("what is drawn", { skip: noBrowser, timeout: 1_800_000 }, () => {
     await settled(page);
     const { red, green } = coloursOf(await picture(page), 0);
     assert.ok(red > 0.3 && green > 0.3, `${red} red, ${green} green`);
+    assert.ok(await page.isHidden("#notice"));
+  });
+
+  test("textures that an OBJ names by paths of other machines are found among the files, and drawn", async () => {
+    const page = await visit({ hash: "#levels=1&layout=side" });
+    const text = [
+      "mtllib D:\\parts\\colours.mtl",
+      "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1",
+      "usemtl red\nf 1/1 2/2 3/3\nusemtl green\nf 1/1 3/3 4/4",
+    ].join("\n");
+    const library = "newmtl red\nmap_Kd -s 1 1 1 C:\\tex\\red one.png\nnewmtl green\nmap_Kd /home/me/tex/green.png\n";
+    const files = { "two.obj": text, "colours.mtl": library };
+    for (const [name, png] of Object.entries(DOTS)) files[name] = Buffer.from(png, "base64");
+    await choose(page, ...Object.entries(files).map(([name, content]) => ({ name, mimeType: "", buffer: Buffer.from(content) })));
+    await settled(page);
+    const shown = await picture(page);
+    for (const from of [0, shown.width / 2]) {
+      const { red, green } = coloursOf(shown, from);
+      assert.ok(red > 0.3 && green > 0.3, `${red} red, ${green} green from ${from}`);
+    }
     assert.ok(await page.isHidden("#notice"));
   });
 

@@ -22,6 +22,7 @@ MADE = {
     "suzanne": bpy.ops.mesh.primitive_monkey_add,
     "cube": bpy.ops.mesh.primitive_cube_add,
     "cylinder": partial(bpy.ops.mesh.primitive_cylinder_add, vertices=16),
+    "cone": partial(bpy.ops.mesh.primitive_cone_add, vertices=16),
 }
 
 

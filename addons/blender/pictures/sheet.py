@@ -16,6 +16,8 @@ from .variants import Shape
 
 # Of a cell, the part that is left free around its mesh; of a cell's height, that of a row of text.
 MARGIN, TEXT = 0.06, 0.11
+# Each row is so much nearer to the eye than the one above, which would throw its shadow on it.
+NEARER = 6.0
 FIELDS = {"distance": "Distance from Loop", "ratio": "Proximity ratio"}
 
 
@@ -37,9 +39,9 @@ def build(rows: Sequence[Row], turn: float) -> tuple[float, float]:
     for column, shape in enumerate(rows[0].shapes):
         text(shape.title, left + column + 0.5, top - 0.6 * TEXT, 0.07)
     top -= TEXT
-    for row, (wide, _), height in zip(rows, extents, heights, strict=True):
+    for number, (row, (wide, _), height) in enumerate(zip(rows, extents, heights, strict=True)):
         scale = (1 - 2 * MARGIN) / wide
-        _build_row(row, left, top, height, scale, turn)
+        _build_row(row, (left, top - height / 2, NEARER * number), scale, turn)
         top -= height
     camera(columns, total)
     light()
@@ -78,8 +80,8 @@ def legend(title: str, highest: float, across: float, along: float) -> None:
     text(f"{highest:.3g}", across + 0.3, along - 0.08, 0.05)
 
 
-def _build_row(row: Row, left: float, top: float, height: float, scale: float, turn: float) -> None:
-    middle = top - height / 2
+def _build_row(row: Row, where: tuple[float, float, float], scale: float, turn: float) -> None:
+    left, middle, depth = where
     if row.look in LOOKS:
         material = LOOKS[row.look]()
         shown = [True] * len(row.shapes)
@@ -91,7 +93,7 @@ def _build_row(row: Row, left: float, top: float, height: float, scale: float, t
         legend(FIELDS[row.look], highest, left + free + 0.5, middle)
     for column, (shape, show) in enumerate(zip(row.shapes, shown, strict=True)):
         if show:
-            place(shape, material, at(left + column + 0.5, middle), scale, turn)
+            place(shape, material, at(left + column + 0.5, middle, depth), scale, turn)
 
 
 def place(
@@ -118,6 +120,11 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
     mesh.update(calc_edges=True)
     if shape.smooth:
         mesh.shade_smooth()
+        ends = np.empty(2 * len(mesh.edges), np.int32)
+        mesh.edges.foreach_get("vertices", ends)
+        keys, sharp = (_keys(pairs, len(shape.vertices)) for pairs in (ends, shape.sharp))
+        marks = mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE")
+        marks.data.foreach_set("value", np.isin(keys, sharp))
     else:
         mesh.shade_flat()
     for name, values in shape.fields.items():
@@ -125,6 +132,12 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
         field.data.foreach_set("value", values.astype(np.float32))
     mesh.materials.append(material)
     return mesh
+
+
+def _keys(pairs: np.ndarray, count: int) -> np.ndarray:
+    """Return a number for each edge, whichever end comes first."""
+    ends = np.sort(pairs.reshape(-1, 2).astype(np.int64), axis=1)
+    return count * ends[:, 0] + ends[:, 1]
 
 
 def centred(shape: Shape) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import radians
 
 import bmesh
@@ -23,13 +23,17 @@ FLAT, LEAN = radians(0.1), radians(40)
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A mesh to show, and what is known at its vertices; ``smooth`` says how it is shaded."""
+    """A mesh to show, and what is known at its vertices.
+
+    ``smooth`` says how it is shaded, but along its ``sharp`` edges.
+    """
 
     title: str
     vertices: Float[np.ndarray, "V 3"]
     faces: Int[np.ndarray, "F 3"]
     smooth: bool
     fields: dict[str, Float[np.ndarray, " V"]]
+    sharp: Int[np.ndarray, "N 2"] = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
 def control(mesh: Mesh, levels: int, model: str | None) -> Shape:
@@ -101,4 +105,6 @@ def _beside_loop(
 ) -> Shape:
     plain, points = refine(mesh, loop(), levels), made.mesh.vertices
     distance = np.linalg.norm(points - plain.mesh.vertices, axis=1)
-    return Shape(title, points, made.mesh.faces, True, {"distance": distance, **fields})
+    last = made.scheme.base.split(made.topologies[-1], Blocks())
+    sharp = last.edges[last.is_sharp].astype(np.int64)
+    return Shape(title, points, made.mesh.faces, True, {"distance": distance, **fields}, sharp)

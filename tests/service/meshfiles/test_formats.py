@@ -93,6 +93,7 @@ def test_seams_make_no_difference_to_the_surface() -> None:
 
 
 CUT = "triangles added by cutting polygons"
+TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
 POLYGONS = {
     "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4\nf 1 3 5\nf 1 2 3 5 4\n",
     "off": b"# comment\nOFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 2 0\n"
@@ -258,6 +259,45 @@ def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: 
     assert sum(counts) + report["dropped"]["vertices"] == unused
 
 
+@pytest.mark.parametrize("normal", ["0 0 1", "-0.6 0 0.8", "0 0 -2.5"])
+@pytest.mark.parametrize("form", ["{normal} {colour}", "{colour} {normal}"])
+def test_colours_and_normals_of_an_off_are_told_apart_in_either_order(
+    form: str, normal: str
+) -> None:
+    # Geomview puts normals first, MeshLab colours.
+    behind = " " + form.format(normal=normal, colour="255 128 0 255") + "\n"
+    data = b"NCOFF\n3 1 0\n" + TRIANGLE.replace(b"\n", behind.encode()) + b"3 0 1 2\n"
+    layers = formats.read(data, "off").layers
+    assert layers[COLOUR].values.tolist() == [[255, 128, 0, 255]] * 3
+    np.testing.assert_array_equal(layers[NORMAL].values, [[*map(float, normal.split())]] * 3)
+
+
+def test_white_of_fractions_is_no_one_of_255_in_an_off() -> None:
+    white = b"".join(b"v %s 1 1 1\n" % line for line in TRIANGLE.splitlines())
+    lines = formats.write(formats.read(white + b"f 1 2 3\n", "obj"), "off").splitlines()
+    assert lines[0] == b"COFF"
+    assert all(b"." in word for line in lines[2:5] for word in line.split()[3:])
+
+
+def test_colours_of_two_bytes_are_fractions_in_an_off() -> None:
+    rows = TRIANGLE.replace(b"\n", b" 65535 0 32768\n")
+    head = b"ply\nformat ascii 1.0\nelement vertex 3\n" + b"".join(
+        b"property %s\n" % name
+        for name in (
+            b"float x",
+            b"float y",
+            b"float z",
+            b"ushort red",
+            b"ushort green",
+            b"ushort blue",
+        )
+    )
+    head += b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    made = formats.write(formats.read(head + rows + b"3 0 1 2\n", "ply"), "off")
+    colours = [[*map(float, line.split()[3:])] for line in made.splitlines()[2:5]]
+    np.testing.assert_allclose(colours, [[1, 0, 32768 / 65535]] * 3)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "data", [b"", b"garbage", b"\0" * 200, b"ply\nformat ascii 1.0\n", b"OFF\n3 1 0\n0 0 0\n"]
@@ -265,9 +305,6 @@ def test_vertices_that_no_face_uses_are_counted(kind: str, data: bytes, unused: 
 def test_what_is_no_mesh_is_unreadable(kind: str, data: bytes) -> None:
     with pytest.raises(UnreadableError):
         formats.read(data, kind)
-
-
-TRIANGLE = b"0 0 0\n1 0 0\n0 1 0\n"
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from service.errors import GltfError
+from service.meshfiles.mesh_file import NORMAL
 from service.options import Limits
 from tests.support.gltf import files
 from tests.support.gltf.flattened import flatten
@@ -89,6 +90,17 @@ def test_joints_and_matrices_that_there_are_not_are_told(joint, inverse, says):
     tree, binary = skinned([[joint, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6, inverse)
     with pytest.raises(GltfError, match=says):
         corners(tree, binary)
+
+
+@pytest.mark.parametrize(("kind", "counts"), [("ply", [1]), ("stl", [])])
+def test_normals_that_joints_would_turn_are_told(kind, counts):
+    tree, binary = skinned([[1, 0, 0, 0]] * 6, [[1, 0, 0, 0]] * 6)
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    attributes["NORMAL"] = attributes["POSITION"]
+    flat, changes = flatten(files.pack(tree, binary), kind, Limits())
+    assert NORMAL not in flat.layers
+    told = [each.count for each in changes if each.what == "normals of skinned meshes left out"]
+    assert told == counts
 
 
 def test_joints_of_another_scene_place_nothing():

@@ -67,7 +67,7 @@ export async function parseGltf(
   neighbours: Map<string, Blob> = new Map(),
   missing = new Set<string>(),
 ): Promise<GLTF> {
-  const { manager, release } = localFiles(neighbours, missing);
+  const { manager, release } = localFiles((url) => neighbours.get(pathOf(url)), missing);
   const loader = new GLTFLoader(manager).register(numbered).register(whole);
   const json = jsonOf(bytes);
   const used = json.extensionsUsed ?? [];

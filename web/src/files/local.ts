@@ -1,7 +1,6 @@
 /** A loading manager that knows the files at hand and no others. */
 
 import { LoadingManager } from "three";
-import { pathOf } from "./path";
 
 export interface Local {
   manager: LoadingManager;
@@ -9,8 +8,8 @@ export interface Local {
   release(): void;
 }
 
-/** `neighbours` are the files by path; `missing` gets the addresses that are not among them. */
-export function localFiles(neighbours: Map<string, Blob>, missing: Set<string>): Local {
+/** `find` returns the file at an address; `missing` gets the addresses that have none. */
+export function localFiles(find: (url: string) => Blob | undefined, missing: Set<string>): Local {
   const made: string[] = [];
   const blobUrl = (blob: Blob): string => {
     const url = URL.createObjectURL(blob);
@@ -22,7 +21,7 @@ export function localFiles(neighbours: Map<string, Blob>, missing: Set<string>):
     if (url.startsWith("blob:")) return url;
     // The content security policy lets blobs be fetched and nothing else.
     if (url.startsWith("data:")) return blobUrl(blobOfDataUri(url));
-    const file = neighbours.get(pathOf(url));
+    const file = find(url);
     if (file) return blobUrl(file);
     missing.add(url);
     return blobUrl(new Blob());

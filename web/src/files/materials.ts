@@ -5,7 +5,8 @@ import { MTLLoader } from "three/addons/loaders/MTLLoader.js";
 import { plainMaterial } from "../view/looks";
 import { localFiles } from "./local";
 import type { ObjMaterials } from "./obj";
-import { shortest } from "./path";
+import { folderOf, leadsTo, libraryPaths } from "./path";
+import { textOf } from "./text";
 
 /** Make a material for each name, once its textures are there; `missing` gets the files that did not come. */
 export async function objMaterials(
@@ -13,24 +14,26 @@ export async function objMaterials(
   neighbours: Map<string, Blob>,
   missing: Set<string>,
 ): Promise<Material[]> {
-  const { manager, release } = localFiles(neighbours, missing);
   const made = new Map<string, MeshPhongMaterial>();
-  let loads = 0;
-  const loaded = new Promise<void>((resolve) => (manager.onLoad = resolve));
-  manager.onStart = () => loads++;
+  const has = (path: string): boolean => neighbours.has(path);
   for (const library of libraries) {
-    const file = neighbours.get(shortest(library));
-    if (!file) {
-      missing.add(library);
-      continue;
-    }
-    const creator = new MTLLoader(manager).parse(await file.text(), "");
-    for (const name of names) {
-      if (name in creator.materialsInfo) made.set(name, creator.create(name) as MeshPhongMaterial);
+    const paths = libraryPaths(library, has);
+    if (!paths.length) missing.add(library);
+    for (const path of paths) {
+      const find = (url: string): Blob | undefined => neighbours.get(leadsTo(url, [folderOf(path), ""], has) ?? "");
+      const { manager, release } = localFiles(find, missing);
+      let loads = 0;
+      const loaded = new Promise<void>((resolve) => (manager.onLoad = resolve));
+      manager.onStart = () => loads++;
+      const text = textOf(await neighbours.get(path)!.arrayBuffer());
+      const creator = new MTLLoader(manager).parse(text.replaceAll("\t", " "), "");
+      for (const name of names) {
+        if (name in creator.materialsInfo) made.set(name, creator.create(name) as MeshPhongMaterial);
+      }
+      if (loads) await loaded;
+      release();
     }
   }
-  if (loads) await loaded;
-  release();
   return names.map((name) => {
     const material = made.get(name);
     if (!material) return plainMaterial();

@@ -20,3 +20,22 @@ export function shortest(path: string): string {
   }
   return steps.join("/");
 }
+
+/** Find where a name in a file leads: as it stands from each of some folders, else by its base name there, as the
+ * paths of other machines do. */
+export function leadsTo(name: string, folders: string[], has: (path: string) => boolean): string | undefined {
+  const path = name.trim().replace(/^"(.*)"$/, "$1").replaceAll("\\", "/");
+  const names = [path, path.slice(path.lastIndexOf("/") + 1)].slice(/^([A-Za-z]:|\/)/.test(path) ? 1 : 0);
+  return names.flatMap((way) => folders.map((folder) => shortest(`${folder}/${way}`))).find(has);
+}
+
+/** Find the files of an OBJ's `mtllib`: one whose name may have blanks, or several. */
+export function libraryPaths(names: string, has: (path: string) => boolean): string[] {
+  const whole = leadsTo(names, [""], has);
+  return whole === undefined ? names.split(/\s+/).flatMap((name) => leadsTo(name, [""], has) ?? []) : [whole];
+}
+
+/** The folder of a path. */
+export function folderOf(path: string): string {
+  return path.slice(0, Math.max(path.lastIndexOf("/"), 0));
+}

@@ -5,7 +5,8 @@ import { fileProblem } from "../api/problem";
 import { listed } from "../report/format";
 import { filesNamedIn } from "./gltf";
 import { ALIASES, kindOf, MEDIA_TYPES, type Kind } from "./kinds";
-import { shortest } from "./path";
+import { folderOf, leadsTo, libraryPaths, shortest } from "./path";
+import { textOf } from "./text";
 
 /** A file with the folder that it came in. */
 export interface PathedFile {
@@ -36,6 +37,11 @@ export interface Dropped {
 const ORDER: Kind[] = ["gltf", "glb", "zip", "obj", "ply", "stl", "off", "3mf"];
 // Files that operating systems leave beside others.
 const HIDDEN = /(^|\/)(\.|__MACOSX\/|Thumbs\.db$|desktop\.ini$)/i;
+
+const LIBRARY = /^[ \t]*mtllib[ \t]+(.+)$/gm;
+// Options of a texture stand before its name.
+const TEXTURE =
+  /^[ \t]*(?:map_\w+|bump|norm|disp|decal|refl)[ \t]+(?:-(?:o|s|t|mm)(?:[ \t]+[-+.\d][-+.\de]*)+[ \t]+|-\w+[ \t]+\S+[ \t]+)*(.+)$/gim;
 
 /** The documents among the files, each with those that it names. */
 export async function uploadsOf(given: PathedFile[]): Promise<Dropped> {
@@ -81,23 +87,25 @@ export async function namedBy(path: string, file: Blob, files: PathedFile[]): Pr
     const there = [...folder.slice(0, Math.max(folder.length - up, 0)), name.slice(3 * up)].join("/");
     return up <= folder.length ? among.get(there) : undefined;
   };
-  const names = kindOf(path) === "obj" ? await namesInObj(file, find) : filesNamedIn(await file.arrayBuffer());
-  return [...names].flatMap((name) => {
+  const found = new Map<string, PathedFile>();
+  const keep = (name: string): boolean => {
     const other = find(name);
-    return other ? [[name, other] as [string, PathedFile]] : [];
-  });
+    if (other) found.set(name, other);
+    return other !== undefined;
+  };
+  if (kindOf(path) === "obj") await keepOfObj(file, found, keep);
+  else filesNamedIn(await file.arrayBuffer()).forEach(keep);
+  return [...found];
 }
 
-async function namesInObj(file: Blob, find: (name: string) => PathedFile | undefined): Promise<Set<string>> {
-  const named = async (text: Promise<string>, statement: RegExp): Promise<string[]> =>
-    [...(await text).matchAll(statement)].map(([, name]) => shortest(name!.trim()));
-  const libraries = await named(file.text(), /^[ \t]*mtllib[ \t]+(.+)$/gm);
-  const textures = libraries.map((name) => {
-    const library = find(name);
-    // Options of a texture stand before its name.
-    return library ? named(library.file.text(), /^[ \t]*(?:map_\w+|bump|norm|disp|decal)[ \t]+(?:.*[ \t])?(\S+)[ \t]*$/gm) : [];
-  });
-  return new Set([...libraries, ...(await Promise.all(textures)).flat()]);
+/** Keep the materials that an OBJ names, and the textures that these name. */
+async function keepOfObj(file: Blob, found: Map<string, PathedFile>, keep: (name: string) => boolean): Promise<void> {
+  for (const [, names] of textOf(await file.arrayBuffer()).matchAll(LIBRARY)) {
+    for (const library of libraryPaths(names!, keep)) {
+      const text = textOf(await found.get(library)!.file.arrayBuffer());
+      for (const [, image] of text.matchAll(TEXTURE)) leadsTo(image!, [folderOf(library), ""], keep);
+    }
+  }
 }
 
 /** The body of a job. */

@@ -44,7 +44,12 @@ def test_first_bytes_say_which_of_both_a_file_is():
         assert read_container(text, kind).text == text
     # What is neither is looked at as its name says.
     assert read_container(b"[]", "gltf").text == b"[]"
-    for start, said in ((b"a text", "'a text t'"), (b"PK\x03\x04", "50 4b 03 04")):
+    for start, said in (
+        (b"a text", "'a text t'"),
+        (b"solid\r\na", "'solid a'"),
+        (b"\n" * 8, "0a 0a"),
+        (b"PK\x03\x04", "50 4b 03 04"),
+    ):
         with pytest.raises(UnreadableError, match=f"not a glTF file: it begins with {said}"):
             read_container(start + b" that is no GLB", "glb")
 
