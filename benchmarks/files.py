@@ -11,12 +11,12 @@ from benchmarks.generated import torus, unrolled_torus
 from benchmarks.memory import in_fresh_process, peak_mib, reset_peak
 from pns_common import load_model
 from service.bodies.sibling_files import ALONE, SiblingFiles, folder_of
-from service.course import Course
 from service.errors import ServiceError
 from service.gltf.subdivide import Subdivided, subdivide_gltf
 from service.meshfiles.glb import triangles_glb
 from service.meshfiles.mesh_file import of_triangles
 from service.options import Limits, Options
+from service.stages import Stages
 
 RUNS = 5
 # What a generated file has beside positions, or gets on the way.
@@ -26,7 +26,7 @@ STAGES = ("read", "weld", "refine", "attributes", "write")
 
 
 @dataclass
-class MemoryCourse(Course):
+class MemoryCourse(Stages):
     """Also keeps each stage's peak memory, in MiB above what stood at the start."""
 
     mib: dict[str, float] = field(default_factory=dict)
@@ -78,17 +78,17 @@ def _measure(
     media = "glb" if data[:4] == b"glTF" else "gltf"
     options = Options(levels, normals="smooth" if normals else "keep")
 
-    def run(course: Course) -> Subdivided:
-        return subdivide_gltf(data, media, options, model, limits, course=course, siblings=siblings)
+    def run(stages: Stages) -> Subdivided:
+        return subdivide_gltf(data, media, options, model, limits, stages=stages, siblings=siblings)
 
     try:
-        done = run(Course())  # warm
+        done = run(Stages())  # warm
     except ServiceError as error:
         return MeasuredFile(refused=f"{error.code}: {error.detail}")
-    runs = [run(Course()).timings for _ in range(RUNS)]
+    runs = [run(Stages()).timings for _ in range(RUNS)]
     seconds = {stage: median(timings[stage] for timings in runs) for stage in runs[0]}
     # Apart from the times: asking for a peak makes the next touch of every page a slow one.
     reset_peak()
-    course = MemoryCourse(base=peak_mib())
-    run(course)
-    return MeasuredFile(done.report["totals"]["faces"], seconds, course.mib)
+    stages = MemoryCourse(base=peak_mib())
+    run(stages)
+    return MeasuredFile(done.report["totals"]["faces"], seconds, stages.mib)

@@ -157,9 +157,9 @@ def batch(
     from rich.console import Console
 
     from ..scale.batch import Batch, batch_work, run_batch
+    from ..scale.console import print_summary
     from ..scale.engines.local import local
     from ..scale.engines.on_ray import on_ray
-    from ..scale.told import print_summary
     from ..settings import Settings
     from .stops import stoppable
 

@@ -11,10 +11,10 @@ from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme, catmull_clark, named_scheme, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
-from ..course import Course
 from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
 from ..report import Change, MeshResult, build_report
+from ..stages import Stages
 from .read.container import encode, write_glb
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
 from .read.plan import BYTES_PER_FACE as BYTES_PER_FACE_OF_MESH
@@ -66,7 +66,7 @@ class Gathered:
 
     meshes: dict[int, Sequence[RefinedPrimitive]] = field(default_factory=dict)
 
-    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], stages: Stages) -> int:
         """Keep the refined primitives of a mesh; return the number of their vertices."""
         self.meshes[mesh] = refined
         return sum(len(primitive.attributes["POSITION"]) for primitive in refined)
@@ -123,29 +123,29 @@ def subdivide_gltf(
     options: Options,
     model: Model | None,
     limits: Limits,
-    course: Course | None = None,
+    stages: Stages | None = None,
     siblings: SiblingFiles = ALONE,
     *,
     traced: bool = False,
 ) -> Subdivided:
     """Refine every triangle mesh of a glTF file.
 
-    `course` receives the progress. `siblings` are the files that the document may name. `traced`
+    `stages` receives the progress. `siblings` are the files that the document may name. `traced`
     asks for the parents of vertices.
 
     Raises:
         ServiceError: the upload is unreadable, invalid, over a limit, or cannot be refined.
         pns_common.errors.ModelError: the model's answer is no correction.
     """
-    course = Course() if course is None else course
+    stages = Stages() if stages is None else stages
 
     def start(upload: Upload) -> Writer:
         return WRITERS[options.compress].start(upload.tree, upload.buffers)
 
-    asked = options, model, limits, course, siblings
+    asked = options, model, limits, stages, siblings
     made = _refined(data, media, *asked, start, traced=traced)
     upload, writer = made.upload, made.into
-    with course.stage("write", PUT_TOGETHER, 1.0):
+    with stages.stage("write", PUT_TOGETHER, 1.0):
         withdraw_unused(upload.tree)
         more = remove_replaced(writer, upload.spare) + writer.changes()
         report = made.report(options.levels, more)
@@ -153,7 +153,7 @@ def subdivide_gltf(
             put_report(upload.tree, report)
         pieces = writer.finish()
         glb = write_glb(encode(upload.tree), pieces, upload.container.others)
-    return Subdivided(glb, report, course.seconds, made.faces_in, made.parents)
+    return Subdivided(glb, report, stages.seconds, made.faces_in, made.parents)
 
 
 def refine_scene(
@@ -162,7 +162,7 @@ def refine_scene(
     options: Options,
     model: Model | None,
     limits: Limits,
-    course: Course,
+    stages: Stages,
     siblings: SiblingFiles,
     check: Callable[[Upload], object],
 ) -> RefinedScene:
@@ -176,7 +176,7 @@ def refine_scene(
         check(upload)
         return Gathered()
 
-    asked = options, model, limits, course, siblings
+    asked = options, model, limits, stages, siblings
     made = _refined(data, media, *asked, start, traced=False)
     report = made.report(options.levels)
     return RefinedScene(made.upload, made.into.meshes, report, made.faces_in)
@@ -188,13 +188,13 @@ def _refined(
     options: Options,
     model: Model | None,
     limits: Limits,
-    course: Course,
+    stages: Stages,
     siblings: SiblingFiles,
     start: Callable[[Upload], Into],
     *,
     traced: bool,
 ) -> _Refined[Into]:
-    with course.stage("read", 0.0, READ):
+    with stages.stage("read", 0.0, READ):
         scheme = make_scheme(options, model)
         packing = BYTES_PER_FACE[options.compress]
         if options.normals != "keep":
@@ -219,10 +219,10 @@ def _refined(
         alike = {plan.mesh: list[int]() for plan in upload.plans}
     firsts = [plan for plan in upload.plans if plan.mesh in alike]
     parents: Arrays = {}
-    with course.part(READ, PUT_TOGETHER):
-        for first in refined_meshes(upload, firsts, scheme, options, course, limits, traced=traced):
-            with course.stage("write"):
-                written = into.replace_mesh(first.index, first.refined, course)
+    with stages.part(READ, PUT_TOGETHER):
+        for first in refined_meshes(upload, firsts, scheme, options, stages, limits, traced=traced):
+            with stages.stage("write"):
+                written = into.replace_mesh(first.index, first.refined, stages)
                 later = [first.of(mesh) for mesh in alike[first.index]]
                 for mesh in later:
                     into.repeat_mesh(mesh.index, first.index, mesh.refined)

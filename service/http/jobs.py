@@ -104,7 +104,7 @@ class Service:
             return self._catalogue
 
     @asynccontextmanager
-    async def taken_in(
+    async def received(
         self, request: Request, parameters: Parameters, *, answer: bool, report: bool
     ) -> AsyncIterator[Job]:
         """Yield the job of a request, once its body is there; its place and files last as long.

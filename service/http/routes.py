@@ -100,7 +100,7 @@ async def _subdivide(
     """Do a job that its client waits for, and where it is to be a stream tell how far it is."""
     is_stream, is_report = kind == media.MIXED, kind == media.JSON
     async with AsyncExitStack() as held:
-        taking = service.taken_in(
+        taking = service.received(
             request, parameters, answer=not is_report, report=is_report or is_stream
         )
         job = await held.enter_async_context(taking)

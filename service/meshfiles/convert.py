@@ -24,13 +24,13 @@ from pns_common.operator.scheme import Scheme
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, Opened, SiblingFiles, folder_of
-from ..course import Course
 from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, Upload, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, refine_scene, subdivide_gltf
 from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import MAX_LEVELS, Limits, Options
 from ..report import Change, changes_of, hint_on
+from ..stages import Stages
 from .companions import companions, copied
 from .flatten import Surface, check_copies, flatten
 from .formats import FORMATS, OF_TRIANGLES, held, read_within
@@ -122,7 +122,7 @@ def _convert_one(
         data, siblings = sys.stdin.buffer.read(), ALONE
     else:
         data, siblings = job.source.read_bytes(), folder_of(job.source)
-    with _progress(console) as course:
+    with _progress(console) as stages:
         written = converted(
             data,
             job.kind,
@@ -130,7 +130,7 @@ def _convert_one(
             options,
             model,
             limits,
-            course,
+            stages,
             siblings,
             traced=jobs.map is not None,
         )
@@ -235,7 +235,7 @@ def converted(
     options: Options,
     model: Model | None,
     limits: Limits,
-    course: Course | None = None,
+    stages: Stages | None = None,
     siblings: SiblingFiles = ALONE,
     *,
     traced: bool = False,
@@ -247,16 +247,16 @@ def converted(
     Raises:
         ServiceError, PnsError: the file or a parameter cannot be used.
     """
-    course = Course() if course is None else course
+    stages = Stages() if stages is None else stages
     if kind in GLTF_KINDS:
         # Kinds are checked where they come from.
         media = cast(Media, kind)
         if target not in GLTF_KINDS:
-            return _flattened(data, media, target, options, model, limits, course, siblings)
-        done = subdivide_gltf(data, media, options, model, limits, course, siblings, traced=traced)
+            return _flattened(data, media, target, options, model, limits, stages, siblings)
+        done = subdivide_gltf(data, media, options, model, limits, stages, siblings, traced=traced)
         written = _of_gltf(done.glb, done.report, target, limits)
         return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
-    with course.stage("read", 0.0, 0.1):
+    with stages.stage("read", 0.0, 0.1):
         mesh, scheme = _taken(read_within(data, kind, limits), options, model, limits)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
@@ -265,17 +265,17 @@ def converted(
     elif options.compress != "none":
         mesh = mesh.with_changes([NOT_COMPRESSED])
         options = replace(options, compress="none")
-    with course.part(0.1, 0.8):
-        refined, report = refine_mesh_file(mesh, scheme, options, limits, course, traced=traced)
+    with stages.part(0.1, 0.8):
+        refined, report = refine_mesh_file(mesh, scheme, options, limits, stages, traced=traced)
     if model is not None and options.learns and scheme.rule is None:
         without = (
             f"the model {model.name} has no rules for polygons, so this is {scheme.name} without "
             "it: use scheme=pns to cut them into triangles for it"
         )
         report = {**report, "advice": [without, *report["advice"]]}
-    with course.stage("write", 0.8, 1.0):
+    with stages.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
-            glb, report = as_glb(refined, report, options, siblings, course)
+            glb, report = as_glb(refined, report, options, siblings, stages)
             written = _of_gltf(glb, report, target, limits)
             written = replace(written, triangles=_triangles_of(refined))
         else:
@@ -288,7 +288,7 @@ def converted(
                 _triangles_of(kept),
                 parents=_map_of(kept, target),
             )
-    return replace(written, seconds=course.seconds, faces_in=len(mesh.sizes))
+    return replace(written, seconds=stages.seconds, faces_in=len(mesh.sizes))
 
 
 def _triangles_of(mesh: MeshFile) -> int:
@@ -420,7 +420,7 @@ def _flattened(
     options: Options,
     model: Model | None,
     limits: Limits,
-    course: Course,
+    stages: Stages,
     siblings: SiblingFiles,
 ) -> Written:
     """Refine a glTF and write its scene as one mesh."""
@@ -433,8 +433,8 @@ def _flattened(
     def check(upload: Upload) -> None:
         check_copies(upload, {plan.mesh: each * plan.faces for plan in upload.plans}, limits)
 
-    scene = refine_scene(data, media, options, model, limits, course, siblings, check)
-    with course.stage("write", 0.95, 1.0):
+    scene = refine_scene(data, media, options, model, limits, stages, siblings, check)
+    with stages.stage("write", 0.95, 1.0):
         surfaces = {
             mesh: [Surface.of(primitive) for primitive in refined]
             for mesh, refined in scene.meshes.items()
@@ -445,7 +445,7 @@ def _flattened(
     # A mesh that several nodes show is there several times.
     report = with_changes(scene.report, [*changes, *lost, *also_lost])
     faces = len(kept.sizes)
-    return Written(content, report, faces, faces, course.seconds, scene.faces_in)
+    return Written(content, report, faces, faces, stages.seconds, scene.faces_in)
 
 
 def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
@@ -454,13 +454,13 @@ def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any
 
 
 @contextmanager
-def _progress(console: Console) -> Iterator[Course]:
+def _progress(console: Console) -> Iterator[Stages]:
     """Show a bar on a terminal while the work goes on, and leave nothing behind."""
     if not console.is_terminal:
-        yield Course()
+        yield Stages()
         return
     from rich.progress import Progress
 
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("refining", total=1.0)
-        yield Course(moves=lambda share: bar.update(task, completed=share))
+        yield Stages(moves=lambda share: bar.update(task, completed=share))

@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Int
 
 from ..bodies.sibling_files import Opened, SiblingFiles
-from ..course import Course
 from ..gltf.constants import COMPONENT_TYPES, FLOAT, NGONS, UNSIGNED_INT
 from ..gltf.read.container import decode_object, encode, read_glb, write_glb
 from ..gltf.read.resources import embed_images
@@ -25,6 +24,7 @@ from ..gltf.write.storage import put_report
 from ..gltf.write.writer import Writer
 from ..options import Limits, Options
 from ..report import Change
+from ..stages import Stages
 from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Labels, Layer, MeshFile
 from .mtl import PLAIN, WHITE, library_files, materials_of, textured
@@ -45,7 +45,7 @@ def as_glb(
     report: dict[str, Any],
     options: Options,
     siblings: SiblingFiles,
-    course: Course,
+    stages: Stages,
 ) -> tuple[bytes, dict[str, Any]]:
     """Write refined triangles or quads; return also the report, with what is lost.
 
@@ -95,7 +95,7 @@ def as_glb(
     # The first corner of a triangle counts.
     writer.in_order = quads
     ngons = quads and options.compress != "draco"
-    vertices = _write_parts(writer, shown, course, ngons=ngons)
+    vertices = _write_parts(writer, shown, stages, ngons=ngons)
     changes += writer.changes()
     if quads and not ngons:
         changes.append(Change("", f"{NGONS} left out: Draco orders triangles anew", 1))
@@ -114,7 +114,7 @@ def triangles_glb(mesh: MeshFile, *, material: dict[str, Any] | None = None) -> 
     materials = [] if material is None else [material]
     writer = Writer.start(_tree(materials), [])
     parts = [replace(part, material=len(materials) - 1) for part in parts_of(mesh)[0]]
-    _write_parts(writer, parts, Course())
+    _write_parts(writer, parts, Stages())
     pieces = writer.finish()
     return write_glb(encode(writer.tree), pieces, [])
 
@@ -132,7 +132,7 @@ def _tree(materials: Sequence[dict[str, Any]], unit: str = "") -> dict[str, Any]
 
 
 def _write_parts(
-    writer: Writer, parts: Sequence[Part], course: Course, *, ngons: bool = False
+    writer: Writer, parts: Sequence[Part], stages: Stages, *, ngons: bool = False
 ) -> int:
     """Write the only mesh; return the number of its vertices."""
     entry = {"extensions": {NGONS: {}}} if ngons else {}
@@ -141,7 +141,7 @@ def _write_parts(
     ]
     if ngons:
         writer.tree["extensionsUsed"] = [NGONS]
-    return writer.replace_mesh(0, [_stored_part(part) for part in parts], course)
+    return writer.replace_mesh(0, [_stored_part(part) for part in parts], stages)
 
 
 def _named(material: int) -> dict[str, Any]:

@@ -29,7 +29,6 @@ from pns_common.report import Report
 from pns_common.schemes import CATMULL_CLARK
 
 from ..advice import Bends, count_bends
-from ..course import Course
 from ..errors import UnrefinableError
 from ..gltf.refine.changes import near_miss_changes, near_misses
 from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
@@ -37,6 +36,7 @@ from ..gltf.refine.normals import safe_unit
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Options
 from ..report import Change
+from ..stages import Stages
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
 from .parts import chosen_of
 from .triangulate import cut_blocks
@@ -90,7 +90,7 @@ class Refined:
 
 
 def refine_polygons(
-    mesh: MeshFile, scheme: Scheme, options: Options, course: Course, *, traced: bool
+    mesh: MeshFile, scheme: Scheme, options: Options, stages: Stages, *, traced: bool
 ) -> Refined:
     """Refine polygons; `traced` asks for the parents of vertices.
 
@@ -98,7 +98,7 @@ def refine_polygons(
         MeshError: a face cannot be refined.
         UnrefinableError: no face of three different vertices.
     """
-    with course.stage("weld", 0.0, 0.1):
+    with stages.stage("weld", 0.0, 0.1):
         control = _control(mesh, options)
         creases = _creases(control, mesh, options, scheme)
     picked = chosen_of(mesh, options)
@@ -106,7 +106,7 @@ def refine_polygons(
         picked = picked[control.faces]
         if not picked.any():
             raise UnrefinableError("no chosen face has three different vertices")
-    with course.stage("refine", 0.1, 0.7):
+    with stages.stage("refine", 0.1, 0.7):
         made = refine(
             control.mesh,
             scheme,
@@ -115,9 +115,9 @@ def refine_polygons(
             limit=options.limit,
             creases=creases,
             faces=picked,
-            progress=lambda done, total: course.reach(done / total),
+            progress=lambda done, total: stages.reach(done / total),
         )
-    with course.stage("attributes", 0.7, 1.0):
+    with stages.stage("attributes", 0.7, 1.0):
         refined = _with_layers(mesh, control, made, options)
     if traced:
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))

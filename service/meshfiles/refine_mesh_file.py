@@ -14,7 +14,6 @@ from pns_common.mesh.mesh import fans
 from pns_common.mesh.rows import marked
 from pns_common.operator.scheme import Scheme
 
-from ..course import Course
 from ..errors import UnrefinableError, check_limit
 from ..gltf.read.plan import (
     BYTES_FOR_LIMIT,
@@ -30,6 +29,7 @@ from ..gltf.refine.new_normals import MOST, are_one
 from ..gltf.write import compression
 from ..options import Limits, Options
 from ..report import MeshResult, build_report
+from ..stages import Stages
 from .mesh_file import NONE, NORMAL, MeshFile
 from .parts import chosen_of, joined, parts_of, with_group_normals
 from .polygons import Refined, refine_polygons
@@ -40,7 +40,7 @@ def refine_mesh_file(
     scheme: Scheme,
     options: Options,
     limits: Limits,
-    course: Course | None = None,
+    stages: Stages | None = None,
     *,
     traced: bool = False,
 ) -> tuple[MeshFile, dict[str, Any]]:
@@ -54,7 +54,7 @@ def refine_mesh_file(
         LimitError: over `max_faces` or `max_memory_bytes`.
         UnrefinableError: no face that has an area, or one that cannot be refined.
     """
-    course = Course() if course is None else course
+    stages = Stages() if stages is None else stages
     check_cost(mesh, options, limits)
     grouped = with_group_normals(mesh)
     if options.normals == "auto":
@@ -62,9 +62,9 @@ def refine_mesh_file(
         options = replace(options, normals="smooth" if smooth else "keep")
     try:
         if scheme.base.polygons:
-            made = refine_polygons(grouped, scheme, options, course, traced=traced)
+            made = refine_polygons(grouped, scheme, options, stages, traced=traced)
         else:
-            made = _refine_triangles(grouped, scheme, options, limits, course, traced=traced)
+            made = _refine_triangles(grouped, scheme, options, limits, stages, traced=traced)
     except MeshError as error:
         raise UnrefinableError(str(error)) from error
     if NORMAL not in mesh.layers and options.normals == "keep":
@@ -102,7 +102,7 @@ def _refine_triangles(
     scheme: Scheme,
     options: Options,
     limits: Limits,
-    course: Course,
+    stages: Stages,
     *,
     traced: bool,
 ) -> Refined:
@@ -117,7 +117,7 @@ def _refine_triangles(
         primitives,
         scheme,
         options,
-        course,
+        stages,
         shares,
         traced=traced,
         chosen=own,

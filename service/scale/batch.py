@@ -15,12 +15,12 @@ from rich.console import Console
 from ..bodies.media import ALIASES, KINDS
 from ..errors import InvalidParameter, NoModelError, ServiceError
 from ..options import Limits, Options
+from .console import Summary, count_aside, line_of, progress
 from .engines.work import Engine, Work
 from .job import FAILED, UNREADABLE_FOLDER, Row, Task, failed, read_libraries, run, target_of
 from .journal import Journal, check_report, open_journal
 from .places import Place, place_of
 from .sources import Item, items_of
-from .told import Summary, count_aside, line_of, progress
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..bodies.media import IDENTITY, Kind, decoded
-from ..course import Course
 from ..memory_cap import memory_cap
 from ..options import Limits, Options
+from ..stages import Stages
 from . import memory_file
 from .models import Catalogue, Models, catalogue_of
 from .progress import PROGRESS
@@ -82,7 +82,7 @@ def subdivide(work: Work) -> Done:
         body = decoded(Path(work.body).read_bytes(), work.encoding, work.body_bytes)
         sent = uploads.sent(body, work.content_type, work.limits)
         model = _MODELS.get(work.model) if work.options.learns else None
-        course = Course(begins=progress.begin, moves=progress.reach)
+        stages = Stages(begins=progress.begin, moves=progress.reach)
         written = converted(
             sent.data,
             sent.kind,
@@ -90,7 +90,7 @@ def subdivide(work: Work) -> Done:
             work.options,
             model,
             work.limits,
-            course,
+            stages,
             sent.siblings,
         )
         if work.report is not None:

@@ -22,10 +22,10 @@ from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refinement import refine
 
-from ...course import Course
 from ...errors import InvalidParameter, UnrefinableError, check_limit
 from ...meshes.uv_charts import linear_uv
 from ...options import Limits, Options
+from ...stages import Stages
 from ..read.primitives import distinct_corners
 from .attributes import RefinedPrimitive, Vertices, facing, refined_attributes, refined_target
 from .columns import carried_skin_and_morph
@@ -44,7 +44,7 @@ def refine_to_goal(
     options: Options,
     limits: Limits,
     pointer: str,
-    course: Course,
+    stages: Stages,
     *,
     traced: bool,
 ) -> tuple[RefinedMesh, list[RefinedPrimitive]]:
@@ -58,7 +58,7 @@ def refine_to_goal(
 
     def watch(done: int, total: int) -> None:
         _check_faces(total if done else total // 2, limits)
-        course.reach(done / total)
+        stages.reach(done / total)
 
     try:
         made = cast(
@@ -79,7 +79,7 @@ def refine_to_goal(
         raise UnrefinableError(str(error), pointer=pointer) from error
     except ParameterError as error:
         raise InvalidParameter(error.name, str(error)) from error
-    skin_and_morph, cut, lost = carried_skin_and_morph(control, made, course)
+    skin_and_morph, cut, lost = carried_skin_and_morph(control, made, stages)
     refined = RefinedMesh(
         made.mesh,
         [made.report],

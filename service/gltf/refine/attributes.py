@@ -19,10 +19,10 @@ from pns_common.mesh.normals import opposed_corners, perpendicular_tangents
 from pns_common.mesh.rows import cross, dot, marked, unit
 from pns_common.parallel import Blocks, available_threads
 
-from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import blocks_of, split_connectivity
 from ...meshes.uv_charts import UvBlend
+from ...stages import Stages
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
 from .control_mesh import ControlMesh, refined_ids, slices
@@ -87,7 +87,7 @@ def refined_primitives(
     refined: RefinedMesh,
     grid: BarycentricGrid,
     uv_blend: UvBlend,
-    course: Course,
+    stages: Stages,
     cut: Cut | None = None,
     ids: Int[np.ndarray, "P T"] | None = None,
 ) -> list[RefinedPrimitive]:
@@ -100,7 +100,7 @@ def refined_primitives(
     ends = slices(control.kept_counts)
     if cut is not None:
         refined = with_still(refined, control, cut, ids, grid)
-    with course.part(0.0, SHADING):
+    with stages.part(0.0, SHADING):
         shading = shade(
             control,
             [ids[rows] for rows in ends],
@@ -108,12 +108,12 @@ def refined_primitives(
             refined.mesh.vertices,
             refined.skin_and_morph,
             refined.limit_normals,
-            course,
+            stages,
         )
     made: list[RefinedPrimitive] = []
-    with course.part(SHADING, 1.0):
+    with stages.part(SHADING, 1.0):
         for number, rows in enumerate(ends):
-            course.reach(rows.start / len(ids))
+            stages.reach(rows.start / len(ids))
             if rows.stop > rows.start:
                 own = ids[rows]
                 part = None if cut is None else Cut(cut.kind[rows], cut.still)

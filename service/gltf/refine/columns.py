@@ -21,8 +21,8 @@ from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import LOOP, BaseScheme
 
-from ...course import Course
 from ...options import Options
+from ...stages import Stages
 from .control_mesh import ControlMesh, Parts
 from .skin import SLOTS, Binding, SkinAndMorph, skin_sets
 
@@ -52,7 +52,7 @@ def refined_skin_and_morph(
     refined_faces: Int[np.ndarray, "G 3"],
     topologies: Sequence[Topology],
     options: Options,
-    course: Course,
+    stages: Stages,
     parts: Parts | None = None,
     base: BaseScheme = LOOP,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
@@ -68,14 +68,14 @@ def refined_skin_and_morph(
     linear = ColumnRefinement(topologies, base, options.limit, Blocks(available_threads()))
     slots = _common_slots(control, refined_faces, linear.count)
     if parts is None:
-        after = _refined(before, linear, slots, course)
+        after = _refined(before, linear, slots, stages)
         return after, *_losses(after.lost, None, 1)
     part = parts.of_row[rows]
     table = None
     if before.binding is not None:
         table, binding = _local_joints(before.binding, part, parts.count)
         before = replace(before, binding=binding)
-    after = _refined(before, linear, slots, course)
+    after = _refined(before, linear, slots, stages)
     part_after = np.empty(linear.count, dtype=np.int64)
     # Descendants are ordered like their faces.
     of_face = np.repeat(part[mesh.faces[:, 0]], len(refined_faces) // len(mesh.faces))
@@ -86,14 +86,14 @@ def refined_skin_and_morph(
 
 
 def carried_skin_and_morph(
-    control: ControlMesh, made: AdaptiveRefinement, course: Course
+    control: ControlMesh, made: AdaptiveRefinement, stages: Stages
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
     """Refine skin and morph with faces of several levels; as ``refined_skin_and_morph``."""
     if not control.skin_and_morph.any:
         return control.skin_and_morph, np.zeros(1, dtype=np.int64), np.zeros(1)
     before = control.skin_and_morph.take(control.vertex_rows())
     slots = _common_slots(control, made.mesh.faces, made.trail.count, made.face_parents)
-    after = _refined(before, made.trail, slots, course)
+    after = _refined(before, made.trail, slots, stages)
     return after, *_losses(after.lost, None, 1)
 
 
@@ -114,25 +114,25 @@ def _refined(
     before: SkinAndMorph,
     linear: Linear,
     slots: Int[np.ndarray, " V"] | None,
-    course: Course,
+    stages: Stages,
 ) -> SkinAndMorph:
     """Refine skin and morph; deltas in float32, in which they are written."""
     binding, lost = None, None
     if before.binding is not None:
-        binding, lost = _refined_binding(before.binding, linear, slots, course)
+        binding, lost = _refined_binding(before.binding, linear, slots, stages)
     deltas: list[Float[np.ndarray, "V 3"]] = []
     for delta in before.deltas:
-        course.reach(1.0)
+        stages.reach(1.0)
         deltas.append(linear(delta.astype(np.float64)).astype(np.float32))
     return SkinAndMorph(binding, tuple(deltas), lost)
 
 
 def _refined_binding(
-    binding: Binding, linear: Linear, slots: Int[np.ndarray, " V"] | None, course: Course
+    binding: Binding, linear: Linear, slots: Int[np.ndarray, " V"] | None, stages: Stages
 ) -> tuple[Binding, Float[np.ndarray, " V"]]:
     """Refine a binding; return also the share of its weight that each vertex lost.
 
-    `slots` are those of each refined vertex; None: all have the binding's. The course is reported
+    `slots` are those of each refined vertex; None: all have the binding's. The stages is reported
     between blocks of joints, of which a small file may have tens of thousands.
     """
     width, blocks = binding.weights.shape[1], Blocks(available_threads())
@@ -144,7 +144,7 @@ def _refined_binding(
     joints = np.zeros((linear.count, width), dtype=np.int32)
     weights, lost = np.zeros((linear.count, width)), np.zeros(linear.count)
     for first in range(0, len(used), COLUMNS):
-        course.reach(1.0)
+        stages.reach(1.0)
         names = used[first : first + COLUMNS]
         here = order[starts[first] : starts[first + len(names)]]
         dense = np.zeros((len(bound), len(names)))

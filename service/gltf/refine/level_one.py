@@ -15,11 +15,11 @@ from pns_common.mesh.topology import build_topology, halves_of
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
 
-from ...course import Course
 from ...meshes.barycentric_grid import HALVES, barycentric_grid
 from ...meshes.uv_charts import refined_charts, uv_blend
 from ...meshes.weld import Weld
 from ...options import Options
+from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .attributes import Columns, RefinedPrimitive, blend, refined_primitives
@@ -37,13 +37,13 @@ def refined_polygons(
     refined: RefinedMesh,
     creases: Creases,
     options: Options,
-    course: Course,
+    stages: Stages,
 ) -> list[RefinedPrimitive]:
     """Return the refined primitives of a control mesh that was refined as polygons."""
     levels, finer = options.levels - 1, level_one(control, polygons, creases, options)
     blend = uv_blend(options, creases_below(polygons, creases), CATMULL_CLARK)
     ids = polygon_ids(polygons, refined.mesh, levels)
-    made = refined_primitives(finer, refined, barycentric_grid(levels), blend, course, ids=ids)
+    made = refined_primitives(finer, refined, barycentric_grid(levels), blend, stages, ids=ids)
     sources = {primitive.number: primitive for primitive in control.primitives}
     return [replace(each, source=sources[each.source.number]) for each in made]
 

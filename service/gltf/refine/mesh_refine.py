@@ -22,9 +22,9 @@ from pns_common.refinement import refine, refine_many
 from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
-from ...course import Course
 from ...errors import UnrefinableError
 from ...options import Options
+from ...stages import Stages
 from .columns import refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
@@ -127,7 +127,7 @@ def refined_mesh(
     scheme: Scheme,
     options: Options,
     pointer: str,
-    course: Course,
+    stages: Stages,
     *,
     traced: bool = False,
 ) -> RefinedMesh:
@@ -144,7 +144,7 @@ def refined_mesh(
             options.reference_length,
             limit=options.limit,
             creases=creases,
-            progress=lambda done, total: course.reach(done / total),
+            progress=lambda done, total: stages.reach(done / total),
         )
         if not control.primitives[0].is_double:
             check_range(made.mesh)
@@ -154,7 +154,7 @@ def refined_mesh(
     return RefinedMesh(
         made.mesh,
         [made.report],
-        *refined_skin_and_morph(control, faces, levels, options, course, base=base),
+        *refined_skin_and_morph(control, faces, levels, options, stages, base=base),
         _scalars(made, options),
         made.normals,
         made.parents if traced else None,
@@ -169,7 +169,7 @@ def refined_union(
     creases: Creases,
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
 ) -> RefinedMesh:
     """Refine the parts of a union, each to the bits that it has alone.
 
@@ -192,7 +192,7 @@ def refined_union(
     return RefinedMesh(
         Mesh.of_refined(np.concatenate([each.mesh.vertices for each in made]), faces),
         [each.report for each in made],
-        *_skin_and_morph_of_union(control, parts, faces, creases, options, course),
+        *_skin_and_morph_of_union(control, parts, faces, creases, options, stages),
         {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
         np.concatenate(normals) if normals else None,
     )
@@ -204,7 +204,7 @@ def _skin_and_morph_of_union(
     faces: Int[np.ndarray, "G 3"],
     creases: Creases,
     options: Options,
-    course: Course,
+    stages: Stages,
 ) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
     """Refine skin and morph of a union whose refined faces are given."""
     if not control.skin_and_morph.any:
@@ -214,7 +214,7 @@ def _skin_and_morph_of_union(
         mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
     )
     own = split_faces(levels[-1], blocks, np.int64)
-    refined, cut, lost = refined_skin_and_morph(control, own, levels, options, course, parts)
+    refined, cut, lost = refined_skin_and_morph(control, own, levels, options, stages, parts)
     # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
     vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
     vertex[faces] = own

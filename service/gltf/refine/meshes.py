@@ -15,16 +15,17 @@ from pns_common.progress import LEARNED_COST
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, count_bends
-from ...course import Course
 from ...errors import InvalidParameter
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Limits, Options
+from ...stages import Stages
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
 from .adaptive import refine_to_goal
 from .attributes import RefinedPrimitive, refined_primitives
+from .batch import MeshOutcome, StageShares, kind_of, refine_batch
 from .changes import (
     changes_of_primitive,
     changes_of_vertices,
@@ -43,7 +44,6 @@ from .new_normals import with_normal_rule, with_smooth_normals
 from .outlines import refined_outlines, with_outline
 from .polygons import Found, find_polygons
 from .selection import Chosen, chosen_primitives, cut_faces
-from .together import MeshOutcome, StageShares, kind_of, refine_together
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
 MOST_FACES = 2**15
@@ -61,12 +61,12 @@ def refined_meshes(
     plans: Sequence[MeshPlan],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     limits: Limits,
     *,
     traced: bool = False,
 ) -> Iterator[MeshOutcome]:
-    """Refine meshes of an upload; each is yielded inside the part of the course for its writing.
+    """Refine meshes of an upload; each is yielded inside the stages' part for its writing.
 
     `traced` asks for the parents of vertices.
 
@@ -86,9 +86,9 @@ def refined_meshes(
     for window in windows:
         count = sum(plan.faces for plan in window)
         own = options if most is None else replace(options, max_faces=most * count // total)
-        with course.part(done / total, (done + count) / total):
+        with stages.part(done / total, (done + count) / total):
             yield from _window(
-                upload, window, scheme, own, course, shares, chosen, limits, traced=traced
+                upload, window, scheme, own, stages, shares, chosen, limits, traced=traced
             )
         done += count
 
@@ -136,23 +136,23 @@ def _window(
     window: Sequence[MeshPlan],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     shares: StageShares,
     chosen: dict[tuple[int, int], bool] | None,
     limits: Limits,
     *,
     traced: bool,
 ) -> Iterator[MeshOutcome]:
-    with course.stage("read", 0.0, shares.weld):
+    with stages.stage("read", 0.0, shares.weld):
         read = [_read(upload, plan) for plan in window]
     outcomes: dict[int, MeshOutcome] = {}
     # Rows of a union are numbered anew, and its faces are refined alike.
     alike = chosen is None and not traced and not scheme.base.polygons and not options.goals
     if len(window) > 1 and options.weld == "position" and alike:
-        outcomes = _together(window, read, scheme, options, course, shares)
+        outcomes = _together(window, read, scheme, options, stages, shares)
     alone = [place for place in range(len(window)) if place not in outcomes]
     for done, place in enumerate(alone):
-        with course.part(done / len(alone), (done + 1) / len(alone)):
+        with stages.part(done / len(alone), (done + 1) / len(alone)):
             plan, own = window[place], None
             if chosen is not None:
                 own = [np.full(len(p.corners), chosen[plan.mesh, p.number]) for p in read[place]]
@@ -164,16 +164,16 @@ def _window(
                 read[place],
                 scheme,
                 options,
-                course,
+                stages,
                 shares,
                 traced=traced,
                 chosen=own,
                 found=found,
                 limits=limits,
             )
-    with course.part(shares.write, 1.0):
+    with stages.part(shares.write, 1.0):
         for place in range(len(window)):
-            with course.part(place / len(window), (place + 1) / len(window)):
+            with stages.part(place / len(window), (place + 1) / len(window)):
                 yield outcomes.pop(place)
 
 
@@ -189,7 +189,7 @@ def _together(
     read: Sequence[list[TrianglePrimitive]],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     shares: StageShares,
 ) -> dict[int, MeshOutcome]:
     """Refine the meshes of a window that can be joined; return them by their place in it."""
@@ -202,8 +202,8 @@ def _together(
     for number, places in enumerate(groups.values()):
         meshes = [read[place] for place in places]
         numbers = [window[place].mesh for place in places]
-        with course.part(number / len(groups), (number + 1) / len(groups)):
-            made = refine_together(meshes, numbers, scheme, options, course, shares)
+        with stages.part(number / len(groups), (number + 1) / len(groups)):
+            made = refine_batch(meshes, numbers, scheme, options, stages, shares)
         outcomes |= {p: o for p, o in zip(places, made, strict=True) if o is not None}
     return outcomes
 
@@ -213,7 +213,7 @@ def refine_alone(
     primitives: list[TrianglePrimitive],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     shares: StageShares,
     *,
     traced: bool = False,
@@ -230,7 +230,7 @@ def refine_alone(
     known when they are made.
     """
     options = with_normal_rule(options, primitives)
-    with course.stage("weld", shares.weld, shares.refine):
+    with stages.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options)
         if found is not None:
             control = control.joined(found)
@@ -242,22 +242,22 @@ def refine_alone(
             control = control.with_new_normals(primitives)
     pointer, made = f"/meshes/{plan.mesh}", None
     refined: list[RefinedPrimitive] = []
-    with course.stage("refine", shares.refine, shares.attributes):
+    with stages.stage("refine", shares.refine, shares.attributes):
         if not control.is_empty and options.goals:
-            asked = control, creases, scheme, options, limits or Limits(), pointer, course
+            asked = control, creases, scheme, options, limits or Limits(), pointer, stages
             made, refined = refine_to_goal(*asked, traced=traced)
         elif not control.is_empty:
-            made = refined_mesh(control, creases, scheme, options, pointer, course, traced=traced)
-    with course.stage("attributes", shares.attributes, shares.write):
+            made = refined_mesh(control, creases, scheme, options, pointer, stages, traced=traced)
+    with stages.stage("attributes", shares.attributes, shares.write):
         if made is not None and not options.goals:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
             cut = None if chosen is None else cut_faces(control, chosen)
             if control.polygons is not None:
                 refined = refined_polygons(
-                    control, control.polygons, made, creases, options, course
+                    control, control.polygons, made, creases, options, stages
                 )
             else:
-                refined = refined_primitives(control, made, grid, blend, course, cut)
+                refined = refined_primitives(control, made, grid, blend, stages, cut)
             for number, edges in refined_outlines(control, made.levels).items():
                 source = control.primitives[number].number
                 refined = [

@@ -21,9 +21,9 @@ from pns_common.mesh.rows import cross, dot, marked, norm, number_by_first_appea
 from pns_common.mesh.topology import EdgeClass, Topology
 from pns_common.parallel import Blocks, available_threads, no_progress
 
-from ...course import Course
 from ...meshes.barycentric_grid import BarycentricGrid
 from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
+from ...stages import Stages
 from .control_mesh import ControlMesh, slices
 from .skin import SkinAndMorph
 
@@ -93,7 +93,7 @@ class NormalGroups:
         self,
         points: Float[np.ndarray, "V 3"],
         otherwise: Callable[[], Float[np.ndarray, "G 3"]],
-        course: Course,
+        stages: Stages,
     ) -> Float[np.ndarray, "G 3"]:
         """Return unit normals of the groups; those of `otherwise` where faces have no area."""
         values = corner_normals(
@@ -102,7 +102,7 @@ class NormalGroups:
             self.connectivity.ids,
             self.connectivity.count,
             self.connectivity.grid.faces,
-            course.count(len(self.vertices)),
+            stages.count(len(self.vertices)),
         )
         # A first look at one column is cheap.
         undefined = np.flatnonzero(values[:, 0] == 0)
@@ -348,7 +348,7 @@ def shade(
     points: Float[np.ndarray, "V 3"],
     skin_and_morph: SkinAndMorph,
     limit_normals: Float[np.ndarray, "V 3"] | None,
-    course: Course,
+    stages: Stages,
 ) -> Shading | None:
     """Return the normals of a refined mesh with vertices at `points`; None without normals.
 
@@ -359,18 +359,18 @@ def shade(
     if groups is None:
         return None
     poses = 1 + len(skin_and_morph.deltas)
-    with course.part(GROUPING, GROUPING + (1 - GROUPING) / poses):
-        of_faces = exact = groups.normals(points, groups.before, course)
+    with stages.part(GROUPING, GROUPING + (1 - GROUPING) / poses):
+        of_faces = exact = groups.normals(points, groups.before, stages)
         if limit_normals is not None:
             exact = groups.with_limit(of_faces, limit_normals)
         rest = groups.with_own(exact.copy(), None)
     morphed: list[Float[np.ndarray, "G 3"] | None] = []
-    with course.part(GROUPING + (1 - GROUPING) / poses, 1.0):
+    with stages.part(GROUPING + (1 - GROUPING) / poses, 1.0):
         for target, delta in enumerate(skin_and_morph.deltas):
-            with course.part(target / (poses - 1), (target + 1) / (poses - 1)):
+            with stages.part(target / (poses - 1), (target + 1) / (poses - 1)):
                 normals = None
                 if _moves_normals(control, target):
-                    posed = groups.normals(points + delta, lambda: of_faces, course)
+                    posed = groups.normals(points + delta, lambda: of_faces, stages)
                     if limit_normals is not None:  # what does not move keeps its normal
                         posed = safe_unit(exact + (posed - of_faces))
                     normals = groups.with_own(posed, target).astype(np.float32)

@@ -13,8 +13,8 @@ from jaxtyping import Float, Int, Shaped
 
 from pns_common.mesh.rows import extent
 
-from ...course import Course
 from ...report import Change
+from ...stages import Stages
 from ..constants import OUTLINE
 from ..read.compressed import DRACO
 from ..read.extensions import declare, drop
@@ -116,12 +116,12 @@ class DracoWriter(Writer):
     plain: list[Change] = field(default_factory=list)
     grid: Grid | None = None
 
-    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], stages: Stages) -> int:
         """Compress the primitives of a mesh on one grid; return the number of vertices written."""
         if refined:
             positions = [primitive.attributes["POSITION"] for primitive in refined]
             self.grid = grid_of(positions)
-        return super().replace_mesh(mesh, refined, course)
+        return super().replace_mesh(mesh, refined, stages)
 
     def replace(self, mesh: int, refined: RefinedPrimitive) -> int:
         """Replace the geometry of a primitive, compressed if possible; return its vertices."""

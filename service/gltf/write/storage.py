@@ -18,7 +18,7 @@ from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import drop, withdraw
 from ..read.plan import MeshPlan, Spare
 from ..read.schema import Document, Mesh, Primitive
-from ..refine.together import MeshOutcome
+from ..refine.batch import MeshOutcome
 from .writer import Writer
 
 # The report is `asset.extras.pns`. Extras may be any JSON value; one that is no object moves to

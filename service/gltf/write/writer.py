@@ -12,8 +12,8 @@ from jaxtyping import Int, Shaped
 
 from pns_common.mesh.rows import extent
 
-from ...course import Course
 from ...report import Change
+from ...stages import Stages
 from ..constants import (
     ARRAY_BUFFER,
     COLUMNS,
@@ -67,11 +67,11 @@ class Writer:
                 view["buffer"] = 0
         return writer
 
-    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], course: Course) -> int:
+    def replace_mesh(self, mesh: int, refined: Sequence[RefinedPrimitive], stages: Stages) -> int:
         """Replace the geometry of a mesh; return the number of vertices written."""
         vertices = 0
         for number, primitive in enumerate(refined):
-            course.reach(number / len(refined))
+            stages.reach(number / len(refined))
             vertices += self.replace(mesh, primitive)
         return vertices
 

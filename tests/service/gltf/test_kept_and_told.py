@@ -6,11 +6,11 @@ import struct
 import numpy as np
 import pytest
 
-from service.course import Course
 from service.errors import GltfError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.example import part_glb
 from service.options import Limits, Options
+from service.stages import Stages
 from service.workers.progress import STAGES
 from tests.service.gltf.subdivided import corner_positions, subdivide
 from tests.support.gltf import files, validator
@@ -301,26 +301,26 @@ def test_totals_are_taken_over_meshes():
 def test_the_share_moves_through_every_stage_and_reaches_its_end(together, compress, monkeypatch):
     if not together:
         monkeypatch.setattr("service.gltf.refine.meshes.MOST_FACES", 0)
-    shares, stages = [], []
-    course = Course(begins=lambda stage: stages.append((stage, shares[-1])), moves=shares.append)
+    shares, begun = [], []
+    stages = Stages(begins=lambda stage: begun.append((stage, shares[-1])), moves=shares.append)
     shares.append(0.0)
     options = Options(scheme="loop", levels=2, compress=compress)
     data = files.glb([octahedron()], [box()])
-    seen = subdivide_gltf(data, "glb", options, None, Limits(), course)
+    seen = subdivide_gltf(data, "glb", options, None, Limits(), stages)
     assert seen.glb == subdivide_gltf(data, "glb", options, None, Limits()).glb
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1)
     # Each stage begins further on than the one before.
-    assert stages == sorted(stages, key=lambda stage: stage[1])
-    assert {stage for stage, _ in stages} == set(STAGES) == set(seen.timings)
+    assert begun == sorted(begun, key=lambda stage: stage[1])
+    assert {stage for stage, _ in begun} == set(STAGES) == set(seen.timings)
 
 
 def test_the_share_moves_inside_the_long_stages():
     """With one mesh alone, progress is told inside the long stages."""
     shares, begun = [0.0], []
-    course = Course(begins=lambda stage: begun.append((stage, len(shares))), moves=shares.append)
+    stages = Stages(begins=lambda stage: begun.append((stage, len(shares))), moves=shares.append)
     options = Options(scheme="loop", levels=4)
-    subdivide_gltf(part_glb(), "glb", options, None, Limits(), course)
+    subdivide_gltf(part_glb(), "glb", options, None, Limits(), stages)
     ends = [at for _, at in begun[1:]] + [len(shares)]
     moved = {
         stage: len(set(shares[start:end])) for (stage, start), end in zip(begun, ends, strict=True)
@@ -345,7 +345,7 @@ def test_what_the_course_raises_ends_the_work(stage):
             Options(scheme="loop", levels=1),
             None,
             Limits(),
-            Course(begins),
+            Stages(begins),
         )
 
 

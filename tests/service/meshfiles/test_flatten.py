@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from service.course import Course
 from service.errors import GltfError, LimitError, UnrefinableError
 from service.meshfiles.convert import converted
 from service.meshfiles.formats import read, write
 from service.options import Limits, Options
+from service.stages import Stages
 from tests.support.gltf import files
 from tests.support.gltf.flattened import flatten
 from tests.support.gltf.shapes import octahedron
@@ -58,12 +58,12 @@ def test_every_copy_stands_where_its_attributes_put_it():
 @pytest.mark.parametrize("copies", [60_000, 4000])
 def test_copies_that_cost_too_much_are_refused_before_anything_is_refined(copies):
     """Each costs its faces, eight or 512 of them, and what placing one takes."""
-    data, stages = copied(TRANSLATION=np.zeros((copies, 3))), list[str]()
+    data, begun = copied(TRANSLATION=np.zeros((copies, 3))), list[str]()
     options = Options(scheme="loop", levels=1 if copies > 10_000 else 4)
-    course = Course(begins=stages.append)
+    stages = Stages(begins=begun.append)
     with pytest.raises(LimitError, match="with all copies") as refused:
-        converted(data, "glb", "stl", options, None, Limits(), course)
-    assert (refused.value.limit, refused.value.status, stages) == ("faces", 413, ["read"])
+        converted(data, "glb", "stl", options, None, Limits(), stages)
+    assert (refused.value.limit, refused.value.status, begun) == ("faces", 413, ["read"])
 
 
 def test_copies_that_their_accessors_do_not_agree_on_are_refused():

@@ -6,9 +6,9 @@ import pytest
 from pns_common import Mesh, loop, refine
 from pns_common.carry.weights import whole_units
 from pns_common.parallel import Blocks
-from service.course import Course
 from service.gltf.subdivide import subdivide_gltf
 from service.options import Limits, Options
+from service.stages import Stages
 from tests.service.gltf.subdivided import subdivide
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
@@ -189,8 +189,8 @@ def test_a_job_can_be_stopped_between_joints_and_between_targets(what, meshes):
             shape = bound(np.arange(24).reshape(6, 4) % count, np.full((6, 4), 0.25))
         else:
             shape = octahedron(targets=[{"POSITION": octahedron()["POSITION"]}] * count)
-        data, stages = files.glb(*[[shape]] * meshes), [""]
-        course = Course(begins=stages.append, moves=lambda _, said=stages: said.append(said[-1]))
-        subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits(), course)
-        told.append(stages.count("refine"))
+        data, begun = files.glb(*[[shape]] * meshes), [""]
+        stages = Stages(begins=begun.append, moves=lambda _, said=begun: said.append(said[-1]))
+        subdivide_gltf(data, "glb", Options(scheme="loop"), None, Limits(), stages)
+        told.append(begun.count("refine"))
     assert told[1] - told[0] >= (24 - 1) // 3

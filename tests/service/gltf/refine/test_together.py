@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pns_common import Mesh, load_model
-from service.course import Course
 from service.gltf.refine import meshes
 from service.gltf.subdivide import Subdivided, subdivide_gltf
 from service.options import Limits, Options
+from service.stages import Stages
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 from tests.support.meshes import icosphere
@@ -176,7 +176,7 @@ def test_progress_goes_on_through_groups(monkeypatch: pytest.MonkeyPatch) -> Non
     told: list[float] = []
     options = Options(levels=3)
     data = files.pack(*files.document(*shapes))
-    subdivide_gltf(data, "glb", options, MODEL, Limits(), Course(moves=told.append))
+    subdivide_gltf(data, "glb", options, MODEL, Limits(), Stages(moves=told.append))
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1)
     assert len(told) > 5

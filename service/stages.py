@@ -14,7 +14,7 @@ def _nobody_listens(_: object) -> None:
 
 
 @dataclass
-class Course:
+class Stages:
     """Told by the work, from any of its threads; tells whoever waits for it.
 
     Work is made of parts, and these of parts; each knows only the share of its own that is done.

@@ -22,11 +22,11 @@ from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, Bends, count_bends
-from ...course import Course
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Options
 from ...report import Change
+from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .attributes import Columns, RefinedPrimitive, refined_primitives
@@ -147,12 +147,12 @@ def _joint_blocks(primitives: Sequence[TrianglePrimitive]) -> int:
     return (-(-len(np.unique(np.concatenate(named))) // COLUMNS)).bit_length() if named else 0
 
 
-def refine_together(
+def refine_batch(
     meshes: Sequence[Sequence[TrianglePrimitive]],
     numbers: Sequence[int],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     shares: StageShares,
 ) -> list[MeshOutcome | None]:
     """Refine meshes of one kind, given by their primitives; `numbers` are their places in the file.
@@ -162,38 +162,38 @@ def refine_together(
     """
     primitives, parts = _joined(meshes)
     options = with_normal_rule(options, primitives)
-    with course.stage("weld", shares.weld, shares.refine):
+    with stages.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options, parts)
-    able = _able(control, parts)
+    able = _refinable(control, parts)
     if control.is_empty or not able.all():
-        return _chosen(able, meshes, numbers, scheme, options, course, shares)
-    with course.stage("weld", shares.weld, shares.refine):
+        return _chosen(able, meshes, numbers, scheme, options, stages, shares)
+    with stages.stage("weld", shares.weld, shares.refine):
         creases = creases_of(control, options, scheme, parts)
         if options.normals != "keep":
             control, parts = _smoothed(control, parts, creases, options)
-    with course.stage("refine", shares.refine, shares.attributes):
+    with stages.stage("refine", shares.refine, shares.attributes):
         try:
-            made = refined_union(control, parts, creases, scheme, options, course)
+            made = refined_union(control, parts, creases, scheme, options, stages)
         except MeshError:
             # The error does not say which mesh it is: try halves, down to one mesh.
             if len(meshes) == 1:
                 return [None]
             half = np.arange(len(meshes)) < len(meshes) // 2
             first, second = (
-                _chosen(each, meshes, numbers, scheme, options, course, shares)
+                _chosen(each, meshes, numbers, scheme, options, stages, shares)
                 for each in (half, ~half)
             )
             return [one or other for one, other in zip(first, second, strict=True)]
-    with course.stage("attributes", shares.attributes, shares.write):
+    with stages.stage("attributes", shares.attributes, shares.write):
         grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-        pieces = refined_primitives(control, made, grid, blend, course)
+        pieces = refined_primitives(control, made, grid, blend, stages)
         part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
         bends = count_bends(control.mesh, creases, options, len(meshes), part_of_face)
         cut = _divided(control, parts, made, pieces, meshes, numbers, options)
         return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
 
 
-def _able(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
+def _refinable(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
     """Return which parts have a face left and an extent."""
     proper = np.concatenate(control.kept)
     points = control.weld.points[control.weld.faces]
@@ -210,7 +210,7 @@ def _chosen(
     numbers: Sequence[int],
     scheme: Scheme,
     options: Options,
-    course: Course,
+    stages: Stages,
     shares: StageShares,
 ) -> list[MeshOutcome | None]:
     """Refine some of the meshes together; None for the others."""
@@ -218,7 +218,7 @@ def _chosen(
     places = np.flatnonzero(chosen).tolist()
     if places:
         own, theirs = [meshes[place] for place in places], [numbers[place] for place in places]
-        parts = refine_together(own, theirs, scheme, options, course, shares)
+        parts = refine_batch(own, theirs, scheme, options, stages, shares)
         for place, part in zip(places, parts, strict=True):
             made[place] = part
     return made
