@@ -31,10 +31,8 @@ def main(arguments: list[str] | None = None) -> None:
     asked = parser().parse_args(arguments)
     stage.clear()
     panels = read(asked.folder, asked.field)
-    width, height = build(panels, asked.turn, asked.field, asked.highest, asked.label)
-    stage.picture(
-        asked.output, round(asked.cell * width), round(asked.cell * height), asked.samples
-    )
+    sides = build(panels, asked.turn, asked.field, asked.highest, asked.label)
+    stage.picture(asked.output, *(round(asked.cell * side) for side in sides), asked.samples)
 
 
 Panels = dict[tuple[int, int], tuple[Shape, str]]

@@ -120,11 +120,11 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
     mesh.update(calc_edges=True)
     if shape.smooth:
         mesh.shade_smooth()
-        ends = np.empty(2 * len(mesh.edges), np.int32)
-        mesh.edges.foreach_get("vertices", ends)
-        keys, sharp = (_keys(pairs, len(shape.vertices)) for pairs in (ends, shape.sharp))
-        marks = mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE")
-        marks.data.foreach_set("value", np.isin(keys, sharp))
+        ends = np.empty((len(mesh.edges), 2), np.int32)
+        mesh.edges.foreach_get("vertices", ends.ravel())
+        keys = [len(shape.vertices), 1]
+        sharp = np.isin(np.sort(ends, axis=1) @ keys, np.sort(shape.sharp, axis=1) @ keys)
+        mesh.attributes.new("sharp_edge", "BOOLEAN", "EDGE").data.foreach_set("value", sharp)
     else:
         mesh.shade_flat()
     for name, values in shape.fields.items():
@@ -132,12 +132,6 @@ def _mesh(shape: Shape, material: bpy.types.Material) -> bpy.types.Mesh:
         field.data.foreach_set("value", values.astype(np.float32))
     mesh.materials.append(material)
     return mesh
-
-
-def _keys(pairs: np.ndarray, count: int) -> np.ndarray:
-    """Return a number for each edge, whichever end comes first."""
-    ends = np.sort(pairs.reshape(-1, 2).astype(np.int64), axis=1)
-    return count * ends[:, 0] + ends[:, 1]
 
 
 def centred(shape: Shape) -> np.ndarray:
