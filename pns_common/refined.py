@@ -97,15 +97,18 @@ class Refinement:
     @cached_property
     def report(self) -> Report:
         """Counts and diagnostics; see ``Report``."""
-        levels = [step.report() for step in self.steps]
         shift = 0.0 if self.surface is None else limit_shift(*self._surface())
+        return self._report_of(self.steps, self.steps[0].level.topology, shift)
+
+    def _report_of(self, steps: Sequence[Step], control: Topology, shift: float = 0.0) -> Report:
+        levels = [step.report() for step in steps]
         return {
             "scheme": self.scheme.name,
             "budget": self.scheme.budget,
             "model": self.scheme.model,
             "model_hash": self.scheme.model_hash,
             "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.steps[0].level.topology.multi_fan_vertices.sum()),
+            "multi_fan_vertices": int(control.multi_fan_vertices.sum()),
             **limit_distances(levels, shift),
             "levels": levels,
         }

@@ -32,7 +32,7 @@ from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
 from pns_common.refined import Refinement, Step, check_coordinates, reference_length_of
-from pns_common.report import Report, limit_distances
+from pns_common.report import Report
 from pns_common.schemes.limit import limit_normals, limit_positions
 from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 
@@ -217,17 +217,10 @@ class AdaptiveRefinement(Refinement):
     @cached_property
     def report(self) -> Report:
         """Counts and diagnostics; see ``Report``."""
-        learned = [step.report() for step in self.steps if step.added is not None]
+        learned = [step for step in self.steps if step.added is not None]
         levels = np.bincount(self.face_levels)
         return {
-            "scheme": self.scheme.name,
-            "budget": self.scheme.budget,
-            "model": self.scheme.model,
-            "model_hash": self.scheme.model_hash,
-            "reference_length": self.reference_length,
-            "multi_fan_vertices": int(self.control.topology.multi_fan_vertices.sum()),
-            **limit_distances(learned),
-            "levels": learned,
+            **self._report_of(learned, self.control.topology),
             "adaptive": {
                 "tolerance": self.goal.tolerance,
                 "max_edge_length": self.goal.max_edge_length,

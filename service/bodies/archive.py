@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import stat
+import sys
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -56,7 +57,7 @@ def open_archive(data: bytes, max_bytes: int) -> tuple[File, SiblingFiles]:
     return unpacker.read(main), siblings
 
 
-def unpacker_of(data: bytes, max_bytes: int = 0) -> Unpacker:
+def unpacker_of(data: bytes, max_bytes: int = sys.maxsize) -> Unpacker:
     """Open any .zip, of which `max_bytes` at most are unpacked; errors are `open_archive`'s."""
     # Counted in the raw bytes before the library makes an object of each; chance adds hardly one.
     count = data.count(_INDEX_ENTRY)

@@ -131,7 +131,7 @@ def read_3mf(data: bytes) -> MeshFile:
         UnrefinableError: a triangle names a vertex that there is not.
         LimitError: the parts are placed too often.
     """
-    files = unpacker_of(data, unpacked_size(data))
+    files = unpacker_of(data)
     package = _Package()
     package.parts.append(_root_of(files))
     # A model names others while it is read.
@@ -165,7 +165,7 @@ def _root_of(files: Unpacker) -> str:
         if attributes.get("Type") == _MODEL:
             targets.append(attributes["Target"].lstrip("/"))
 
-    _parse(_content(files, "_rels/.rels"), "_rels/.rels", start, lambda name: None)
+    _parse(_content(files, "_rels/.rels"), "_rels/.rels", start)
     if not targets:
         raise UnreadableError("this is not a 3MF file: the archive names no 3D model")
     return targets[0]
@@ -175,12 +175,11 @@ def _parse(
     content: bytes,
     part: str,
     start: Callable[[str, dict[str, str]], None],
-    end: Callable[[str], None],
     prefix: Callable[[str | None, str | None], None] = lambda prefix, uri: None,
 ) -> None:
     """Read XML; an element of a namespace is `NAMESPACE name`."""
     parser = expat.ParserCreate(namespace_separator=" ")
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartElementHandler = start
     parser.StartNamespaceDeclHandler = prefix
     parser.buffer_text = True
 
@@ -231,7 +230,7 @@ class _Reader:
 
     def read(self, content: bytes) -> None:
         """Read the part."""
-        _parse(content, self.part, self._start, lambda name: None, self._prefix)
+        _parse(content, self.part, self._start, self._prefix)
 
     def _prefix(self, prefix: str | None, uri: str | None) -> None:
         self.prefixes[prefix or ""] = uri or ""
