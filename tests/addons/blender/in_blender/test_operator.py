@@ -65,6 +65,9 @@ def test_detail_makes_faces_where_the_surface_bends():
     made = refined(obj, detail="FACES", max_faces=1000, scheme="LOOP").data
     np.testing.assert_allclose(points_of(made), expected.mesh.vertices, rtol=0, atol=1e-6)
     assert 900 < len(made.polygons) <= 1000
+    turned = refined(obj, detail="ANGLE", angle=np.radians(20), scheme="LOOP").data
+    expected = pns_common.refine(mesh, pns_common.loop(), angle=20, creases=None)
+    assert len(turned.polygons) == expected.mesh.face_count
     near = refined(obj, detail="TOLERANCE", tolerance=0.05).data
     assert "adaptive" in near.pns_result.report
 

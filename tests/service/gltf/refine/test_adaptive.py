@@ -31,7 +31,9 @@ def library(**goal):
     return refine(Mesh(shape["POSITION"].astype(float), shape["indices"]), loop(), **goal)
 
 
-@pytest.mark.parametrize("goal", [GOAL, {"max_faces": 200}, {"max_edge_length": "12%"}])
+@pytest.mark.parametrize(
+    "goal", [GOAL, {"angle": 20.0}, {"max_faces": 200}, {"max_edge_length": "12%"}]
+)
 def test_faces_are_the_librarys(goal):
     faces, attributes = files.primitive_of(refined([shaped()], **goal).glb)
     made = library(**goal).mesh
@@ -121,6 +123,9 @@ def test_data_of_other_libraries_follow():
         ({"tolerance": "0"}, "tolerance"),
         ({"tolerance": "-1"}, "tolerance"),
         ({"tolerance": "nan"}, "tolerance"),
+        ({"angle": 0.0}, "angle"),
+        ({"angle": 180.0}, "angle"),
+        ({"angle": float("nan")}, "angle"),
         ({"max_edge_length": "1 mm"}, "max_edge_length"),
         ({"max_faces": 0}, "max_faces"),
         ({"tolerance": "1", "uv": "smooth"}, "uv"),
