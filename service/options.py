@@ -146,6 +146,12 @@ class Options:
         names = ("tolerance", "angle", "max_faces", "max_edge_length")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
+    def faces_after(self, triangles: int) -> int:
+        """Return how many faces triangles become; of a goal the most, or the least if not known."""
+        if self.max_faces is not None:
+            return max(self.max_faces, triangles)
+        return triangles if self.goals else triangles * 4**self.levels
+
     @property
     def learns(self) -> bool:
         """True if a model is asked for, if only for meshes of triangles."""

@@ -146,6 +146,19 @@ def test_fewer_faces_than_there_are_is_an_error_that_says_how_many_are_possible(
     assert error.value.name == "max_faces"
 
 
+def test_what_whole_levels_would_make_is_no_reason_to_refuse():
+    shape, most = shaped(), Limits(max_faces=60)
+    rows = "".join(f"v {x} {y} {z}\n" for x, y, z in shape["POSITION"].tolist())
+    rows += "".join(f"f {a} {b} {c}\n" for a, b, c in (shape["indices"] + 1).tolist())
+    asked = Options(scheme="loop", max_faces=50), None
+    for goal in ({"tolerance": "90%"}, {"max_faces": 50}):
+        assert refined([shape], limits=most, **goal).report["totals"]["faces"] <= 50
+    assert converted(rows.encode(), "obj", "obj", *asked, most).faces <= 50
+    with pytest.raises(LimitError) as refusal:
+        refined([shape], limits=most, max_faces=70)
+    assert refusal.value.found == 70
+
+
 def test_the_limit_of_faces_holds():
     with pytest.raises(LimitError):
         refined([shaped()], tolerance="0.01%", limits=Limits(max_faces=2000))
