@@ -78,14 +78,18 @@ def test_vertices_are_where_whole_levels_put_them(name, scheme):
     assert made.mesh.face_count <= whole.mesh.face_count
 
 
-@pytest.mark.parametrize("sharpness", [1.0, 1.5, np.inf])
-def test_edges_that_wear_off_do_so_in_parts_of_levels(sharpness):
+@pytest.mark.parametrize("sharpness", [1.0, 1.5, 2.5, np.inf])
+@pytest.mark.parametrize("levels", [None, 1, 2])
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_edges_that_wear_off_do_so_in_parts_of_levels(sharpness, levels, scheme):
+    """Also where learned and other creases end before."""
     points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
     mesh = Mesh(points, faces)
     pairs = mesh.topology().edges[::4].astype(np.int64)
-    creases = Creases(pairs, np.full(len(pairs), sharpness), wears=True)
-    made = refine(mesh, "loop", LEVELS, tolerance="1%", creases=creases)
-    whole = refine(mesh, "loop", LEVELS, creases=creases).mesh.vertices
+    given = np.full(len(pairs), sharpness)
+    creases = Creases(pairs, given, wears=True, learned=True, levels=levels)
+    made = refine(mesh, scheme, LEVELS, tolerance="1%", creases=creases)
+    whole = refine(mesh, scheme, LEVELS, creases=creases).mesh.vertices
     away, _ = cKDTree(whole).query(made.mesh.vertices)
     assert away.max() < 1e-12
 
