@@ -22,7 +22,7 @@ from pns_common.operator.scheme import NAMES, Scheme, named_scheme
 from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
-from pns_common.progress import Progress
+from pns_common.progress import Progress, Shares
 from pns_common.refined import Refinement, Step, check_coordinates
 from pns_common.schemes.limit import limit_positions
 
@@ -95,7 +95,8 @@ def refine(
             vertices stay. The report is that of refining all.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
-            any thread, one at a time; an exception that it raises ends the refinement.
+            any thread, one at a time; an exception that it raises ends the refinement. With a
+            tolerance or the like both are estimates, of which the quotient never falls.
 
     Raises:
         ParameterError: an argument out of range, or a crease that is no edge.
@@ -193,7 +194,7 @@ def _refine_to_goal(
     progress: Callable[[int, int], None] | None,
 ) -> Refinement:
     """Refine a mesh of triangles until a goal is reached; arguments as of ``refine``."""
-    from pns_common.adaptive.refine import goal_of, refine_to_goal
+    from pns_common.adaptive.refine import LEARNED, goal_of, refine_to_goal
 
     given = "a tolerance, angle, max_faces or max_edge_length"
     if scheme.base.polygons:
@@ -206,23 +207,26 @@ def _refine_to_goal(
         raise ParameterError("limit", limit, expected=f"True with {given}")
     if faces is not None:
         raise ParameterError("faces", "given", expected=f"None with {given}")
+    if progress is not None and not callable(progress):
+        raise ParameterError("progress", progress, expected=PROGRESS)
     deepest = levels_given(DEFAULT_DEEPEST if levels is None else levels)
     goal = goal_of(mesh, *goals)
     length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
     kept = chosen_creases(creases, scheme.creases)
     kept = kept if border is None else replace(kept, border=border)
-    if progress is not None and not callable(progress):
-        raise ParameterError("progress", progress, expected=PROGRESS)
-    blocks = Blocks(_threads(threads))
+    shares, faces = Shares(progress), mesh.face_count
+
+    def tell(done: int, total: int) -> None:
+        shares.reach(done / total, faces)
+
+    learns = scheme.acts_at(0) and bool(length)
+    told = _progress(4 * faces, 1, 1, False, tell if learns and progress else None)
+    blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
+    shares.part(0.0, LEARNED)
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level = with_sharp_edges(level, kept, scheme)
-
-    def tell(count: int) -> None:
-        if progress is not None:
-            progress(0, max(count, 1))
-
-    first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
-    made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
+    first = _step(level, scheme, 0) if learns else None
+    made = refine_to_goal(level, first, scheme, kept, goal, deepest, shares)
     if progress is not None:
         progress(made.mesh.face_count, made.mesh.face_count)
     return made

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,6 +31,7 @@ from pns_common.mesh.rows import marked
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
+from pns_common.progress import Shares
 from pns_common.refined import Refinement, Step, check_coordinates, reference_length_of
 from pns_common.report import Report
 from pns_common.schemes.limit import limit_normals, limit_positions
@@ -40,6 +40,9 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
+# Shares of the work, roughly: until the learned level is there, until trees have all their faces
+# but those that closing adds, and until those to split are chosen.
+LEARNED, GROWN, CHOSEN = 0.15, 0.65, 0.75
 # The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
 # are 2 k + 1 and 2 k + 2.
 HALVES = 0.5 * np.array(
@@ -248,7 +251,7 @@ def refine_to_goal(
     creases: Creases,
     goal: Goal,
     deepest: int,
-    tell: Callable[[int], None],
+    shares: Shares,
 ) -> AdaptiveRefinement:
     """Refine a mesh to a goal.
 
@@ -258,36 +261,41 @@ def refine_to_goal(
         scheme, creases: those of the refinement.
         goal: what is to be reached.
         deepest: the most levels that may be used.
-        tell: called with numbers of faces, at each level of each attempt.
+        shares: what reports progress.
     """
     mesh = level.topology
     levels = Levels(scheme.base, level.blocks.quiet(), deepest, creases.levels)
     numbers, faces = np.arange(len(level.points)), np.arange(mesh.face_count)
     control = Part(0, mesh, level.points, numbers, faces, np.ones(len(faces), dtype=bool))
-    start = Start(control, None, levels, goal, tell)
+    start = Start(control, None, levels, goal, shares.reach)
     if first is not None:
         every = np.arange(len(first.points))
         topology = scheme.base.split(mesh, levels.blocks, inherit=levels.inherit(1))
         codes, there = np.arange(CHILDREN * len(faces)), np.ones(CHILDREN * len(faces), dtype=bool)
         finer = Part(1, topology, first.points, every, codes, there)
         start = replace(start, first=(finer, Refined(numbers, mesh, every)))
-    tree = _with_so_many(start) if goal.max_faces is not None else _near_enough(start)
+    shares.part(LEARNED if start.first is not None else 0.0, GROWN)
+    find = _near_enough if goal.max_faces is None else _with_so_many
+    tree = find(start, shares)
     return _written(tree, level, first, scheme, levels, goal)
 
 
-def _near_enough(start: Start) -> Tree:
+def _near_enough(start: Start, shares: Shares) -> Tree:
     """Return a tree that reaches the tolerance, and whose faces can be cut to meet."""
-    tree = start.grow(1.0)
+    tree, left = start.grow(1.0), 1 - GROWN
     while True:
         closed = tree.closed(tree.split, start.goal.tolerance)
         if _same(tree.split, closed):
             return tree
         forced, known = tree.codes(closed), tree.measured
         del tree, closed
+        # Each time fewer faces are new.
+        shares.part(1 - left, 1 - left / 4)
+        left /= 4
         tree = start.grow(1.0, forced, known=known)
 
 
-def _with_so_many(start: Start) -> Tree:
+def _with_so_many(start: Start, shares: Shares) -> Tree:
     """Return a tree of so many faces as are asked for, or fewer."""
     goal, tree = start.goal, start.grow(np.inf)
     most, bounded = goal.max_faces or 0, goal.tolerance is not None or goal.max_edge_length
@@ -306,6 +314,7 @@ def _with_so_many(start: Start) -> Tree:
     high, more = len(order), made
     if made <= most:
         low = high
+    shares.part(GROWN, CHOSEN)
     while high - low > 1:
         # Faces are nearly proportional to splits; each third time the middle, so that it ends.
         turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
@@ -315,6 +324,8 @@ def _with_so_many(start: Start) -> Tree:
             low, fewer = middle, made
         else:
             high, more = middle, made
+        shares.reach(1 - (high - low).bit_length() / len(order).bit_length(), fewer)
+    shares.part(CHOSEN, 1.0)
     forced, known = tree.codes(tree.closed(_flagged(tree, order[:low]))), tree.measured
     del tree
     return start.grow(threshold, forced, only=True, known=known)

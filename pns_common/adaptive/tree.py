@@ -8,7 +8,7 @@ choose, and the result does not depend on numbering.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
 from pns_common.mesh.topology import Topology
 
+# Faces that are measured between two reports of progress.
+TOGETHER = 2**16
 # Errors that agree in so many digits are equal.
 DIGITS = 9
 Flags = Sequence[Bool[np.ndarray, " _"]]
@@ -211,14 +213,14 @@ class Start:
         first: the whole next level and the step to it, where it is made by more than masks.
         levels: the rules.
         goal: what is to be reached.
-        tell: called at each level with the number of its faces.
+        tell: called with the share of a tree that is grown, and the faces that it has.
     """
 
     control: Part
     first: tuple[Part, Refined] | None
     levels: Levels
     goal: Goal
-    tell: Callable[[int], None]
+    tell: Callable[[float, int], None]
 
     def grow(
         self,
@@ -236,10 +238,9 @@ class Start:
             only: split no others.
             known: faces that need not be measured again, level by level.
         """
-        part, names = self.control, len(self.control.points)
+        part, names, done = self.control, len(self.control.points), 0
         places, layers = np.full((names, 3), np.nan), list[Layer]()
         for depth in range(self.levels.deepest + 1):
-            self.tell(int(part.exists.sum()))
             finer, step, middles, settled = None, None, self._no_middles(part), list[Settled]()
             if self.first is not None and depth == 0:
                 finer, step = self.first
@@ -249,8 +250,12 @@ class Start:
             else:
                 settled = self._settle(part, places)
             old = known[depth] if depth < len(known) else None
-            measured = self._measured(part, places, finer, old)
-            errors = measured[0]
+            there, count = int(part.exists.sum()), part.topology.face_count
+            measured = errors, _, _ = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
+            seen, expected = 0, 0.0
+            for rows in self._measure(part, places, finer, old, measured):
+                seen, expected = seen + len(rows), expected + self._expected(errors[rows], depth)
+                self._tell(done + seen, done + there * expected / seen, done + there)
             split = part.exists & (errors > threshold) & (not only)
             if forced is not None and depth < len(forced):
                 split |= part.exists & np.isin(part.codes, forced[depth])
@@ -263,6 +268,7 @@ class Start:
                     places = _longer(places, len(step.topology.edges))
                 names = len(places)
             layers.append(Layer(part, split, *measured, middles, step, settled))
+            done += there - int(split.sum())
             if finer is None or not split.any():
                 break
             part = finer
@@ -281,38 +287,53 @@ class Start:
             places[own.names] = own.limits
         return made
 
-    def _measured(
+    def _measure(
         self,
         part: Part,
         places: Float[np.ndarray, "N 3"],
         finer: Part | None,
         known: Measured | None,
-    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]:
-        """Return errors, slabs and turns of faces that exist.
+        to: tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]],
+    ) -> Iterator[Integer[np.ndarray, " N"]]:
+        """Write errors, slabs and turns of faces that exist; yield which, as they are written.
 
         They are measured on those of the next level if it is given. Those that are known are not
         measured again.
         """
-        count, rows = part.topology.face_count, np.flatnonzero(part.exists)
-        made = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
+        (errors, widths, turned), rows = to, np.flatnonzero(part.exists)
         if known is not None and len(known.codes):
             codes = part.codes[rows]
             there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
             same = known.codes[there] == codes
-            for own, old in zip(made, (known.errors, known.slabs, known.turns), strict=True):
+            for own, old in zip(to, (known.errors, known.slabs, known.turns), strict=True):
                 own[rows[same]] = old[there[same]]
+            if same.any():
+                yield rows[same]
             rows = rows[~same]
-        if len(rows):
-            errors, widths, turned = made
-            triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
-            of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
-            enough = self.goal.tolerance or 0.0
-            asked = triangles, folded(part)[rows], self.levels, int(deeper), enough
-            widths[rows] = slabs(finer or part, of_finer, *asked)
+        folds, enough = folded(part), self.goal.tolerance or 0.0
+        for begin in range(0, len(rows), TOGETHER):
+            some = rows[begin : begin + TOGETHER]
+            triangles, deeper = places[part.names[part.topology.faces[some]]], finer is not None
+            of_finer = CHILDREN * some[:, None] + np.arange(CHILDREN) if deeper else some
+            asked = triangles, folds[some], self.levels, int(deeper), enough
+            widths[some] = slabs(finer or part, of_finer, *asked)
             if self.goal.angle is not None:
-                turned[rows] = turns(part, finer, rows, self.levels)
-            errors[rows] = self.goal.errors(distances(widths[rows]), turned[rows], triangles)
-        return made
+                turned[some] = turns(part, finer, some, self.levels)
+            errors[some] = self.goal.errors(distances(widths[some]), turned[some], triangles)
+            yield some
+
+    def _expected(self, errors: Float[np.ndarray, " N"], depth: int) -> float:
+        """Return into how many faces some are going to be split, if four of one quarter errors."""
+        most = CHILDREN ** (self.levels.deepest - depth)
+        split = errors[errors > 1]
+        return len(errors) - len(split) + float(np.clip(split, min(CHILDREN, most), most).sum())
+
+    def _tell(self, done: int, expected: float, faces: int) -> None:
+        """Report progress: faces that are measured, of those that are expected or asked for."""
+        most = self.goal.max_faces
+        if most is not None:
+            expected, faces = most, min(faces, most)
+        self.tell(min(done / expected, 1.0), faces)
 
 
 def _longer(places: Float[np.ndarray, "N 3"], more: int) -> Float[np.ndarray, "M 3"]:

@@ -17,14 +17,13 @@ from pns_common.adaptive.parts import CHILDREN, Levels, Part
 from pns_common.mesh.rows import dot, marked
 from pns_common.schemes.limit import limit_normals
 
-# Faces that are measured together: the next level is made for them alone.
-TOGETHER = 2**16
-
 
 def turns(
     part: Part, finer: Part | None, rows: Integer[np.ndarray, " N"], levels: Levels
 ) -> Float[np.ndarray, " N"]:
     """Return the largest distance between unit normals of each of some faces: 2 sin(angle / 2).
+
+    The next level is made for these faces alone.
 
     Args:
         part: the faces.
@@ -32,19 +31,15 @@ def turns(
         rows: which faces, ascending.
         levels: the rules.
     """
-    made = np.empty(len(rows))
-    for begin in range(0, len(rows), TOGETHER):
-        some = marked(rows[begin : begin + TOGETHER], part.topology.face_count)
-        if finer is not None:
-            next_level = replace(finer, exists=np.repeat(some, CHILDREN))
-        else:
-            next_level = levels.split(part, some, len(part.points))[0]
-        children = np.flatnonzero(next_level.exists).reshape(-1, CHILDREN)
-        normals = _at_corners(next_level, levels)[children]
-        # Children 0 to 2 begin at a corner of the face; the last one's corners are on its sides.
-        six = np.concatenate([normals[:, :3, 0], normals[:, 3]], axis=1)
-        made[begin : begin + TOGETHER] = _widest(six)
-    return made
+    some = marked(rows, part.topology.face_count)
+    if finer is not None:
+        finer = replace(finer, exists=np.repeat(some, CHILDREN))
+    else:
+        finer, _, _ = levels.split(part, some, len(part.points))
+    children = np.flatnonzero(finer.exists).reshape(-1, CHILDREN)
+    normals = _at_corners(finer, levels)[children]
+    # Children 0 to 2 begin at a corner of the face; the last one's corners are on its sides.
+    return _widest(np.concatenate([normals[:, :3, 0], normals[:, 3]], axis=1))
 
 
 def chord(degrees: float) -> float:

@@ -312,6 +312,28 @@ def test_no_side_is_longer_than_asked():
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("goal", [*GOALS, {"tolerance": "0.1%", "max_faces": 900}])
+def test_progress_moves_never_falls_and_ends_with_all_faces(scheme, goal):
+    mesh, told = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3)), []
+    made = refine(mesh, scheme, progress=lambda *faces: told.append(faces), **goal)
+    shares = [done / total for done, total in told]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.3
+    assert np.diff(shares).max() < 0.6
+    assert len(set(shares)) > 2
+    assert told[-1] == (made.mesh.face_count, made.mesh.face_count)
+
+
+def test_an_exception_of_progress_ends_a_refinement_to_a_goal():
+    def stop(done, total):
+        if done > 100:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refine(Mesh(*bumpy_sphere()), "loop", tolerance="0.1%", progress=stop)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_values_are_carried_like_positions(scheme):
     mesh = shape("bumps")
     made = refine(mesh, scheme, LEVELS, tolerance="1%", creases=None)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, loop, refine, subdivide
+from pns_common import Mesh, load_model, loop, refine, subdivide
 from service.errors import InvalidParameter, LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.convert import converted
 from service.options import Limits, Options
+from service.stages import Stages
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
 from tests.support.meshes import bumpy_sphere
@@ -157,6 +158,19 @@ def test_what_whole_levels_would_make_is_no_reason_to_refuse():
     with pytest.raises(LimitError) as refusal:
         refined([shape], limits=most, max_faces=70)
     assert refusal.value.found == 70
+
+
+@pytest.mark.parametrize("goal", [{"tolerance": "0.1%"}, {"angle": 10.0}, {"max_faces": 900}])
+def test_progress_moves_through_the_work_and_its_stages(goal):
+    told, begun = [], []
+    stages = Stages(begins=begun.append, moves=told.append)
+    data, options = files.glb([shaped()]), Options(**goal)
+    subdivide_gltf(data, "glb", options, load_model(), Limits(), stages)
+    assert told == sorted(told)
+    assert told[-1] == 1
+    assert np.diff(told).max() < 0.3
+    assert begun.index("refine") < begun.index("attributes")
+    assert stages.seconds["attributes"] > 0
 
 
 def test_the_limit_of_faces_holds():
