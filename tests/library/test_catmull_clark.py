@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pns_common import Creases, Mesh, MeshError, ParameterError, catmull_clark, loop
 from pns_common.carry.columns import level_topologies
 from pns_common.mesh.quads import split_quads
-from pns_common.mesh.topology import EdgeClass, build_topology
+from pns_common.mesh.topology import build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
 from pns_common.schemes.matrix import subdivision_matrix
@@ -225,41 +225,6 @@ def test_new_vertices_and_quads_are_numbered_as_designed():
             centre = count + edge_count + f
             assert next(quads) == [vertex, count + leaving, centre, count + entering]
     assert next(quads, None) is None
-
-
-@given(polygon_soups(), st.integers(1, 3))
-def test_any_faces_are_refined_and_reported(mesh, levels):
-    refined = refine(mesh, catmull_clark(), levels, creases=None)
-    report = refined.report
-    assert len(refined.mesh.faces) == len(mesh.corners) * 4 ** (levels - 1)
-    assert report["levels"][-1]["vertices"] == len(refined.mesh.vertices)
-    assert report["levels"][-1]["faces"] == len(refined.mesh.faces)
-    topology = mesh.topology()
-    irregular = int((topology.edge_class == EdgeClass.IRREGULAR).sum())
-    assert report["levels"][0]["edges"]["irregular"] == irregular
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    slack = 1e-12 * np.abs(mesh.vertices).max()
-    assert (refined.mesh.vertices >= low - slack).all()
-    assert (refined.mesh.vertices <= high + slack).all()
-
-
-@given(st.one_of(polygon_manifolds(), polygon_soups()), st.integers(0, 2**31))
-def test_masks_are_convex(mesh, seed):
-    topology, _ = creased(mesh, seed, soft=True)
-    weights = CATMULL_CLARK.place(np.eye(len(mesh.vertices)), topology, Blocks())
-    assert weights.min() >= 0
-    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-14)
-
-
-@given(st.one_of(polygon_manifolds(), polygon_soups()))
-def test_faces_turned_over_give_the_same_points(mesh):
-    # The first corner stays first, so that edges of a face keep their numbers in reverse.
-    turned = Mesh(mesh.vertices, [[face[0], *face[:0:-1]] for face in rows_of(mesh)])
-    ours, theirs = (CATMULL_CLARK.place(m.vertices, m.topology(), Blocks()) for m in (mesh, turned))
-    size, count = np.abs(mesh.vertices).max(), len(mesh.vertices)
-    np.testing.assert_allclose(theirs[:count], ours[:count], rtol=0, atol=1e-13 * size)
-    faces = mesh.face_count
-    np.testing.assert_allclose(theirs[-faces:], ours[-faces:], rtol=0, atol=1e-13 * size)
 
 
 def test_a_regular_grid_is_the_bicubic_b_spline():
