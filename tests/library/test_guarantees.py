@@ -29,6 +29,7 @@ from tests.support.polygons import (
     polygon_soups,
     quad_grid,
     quad_star,
+    renumbered,
     rows_of,
     uneven,
 )
@@ -211,13 +212,8 @@ def test_scaling_a_mesh_scales_the_result(rule, data, power):
 @each_directed
 @given(data=st.data(), seed=seeds)
 def test_renumbering_permutes_the_output(rule, data, seed):
-    """Other numbers, another order of faces, and another first corner of each."""
-    mesh, scheme, rng = data.draw(MANIFOLDS[rule]), pns(EXACT[rule]), np.random.default_rng(seed)
-    order = rng.permutation(len(mesh.vertices))
-    points = np.empty_like(mesh.vertices)
-    points[order] = mesh.vertices
-    faces = [np.roll(order[face], rng.integers(9)).tolist() for face in rows_of(mesh)]
-    other = Mesh(points, [faces[f] for f in rng.permutation(len(faces))])
+    mesh, scheme = data.draw(MANIFOLDS[rule]), pns(EXACT[rule])
+    other, order = renumbered(mesh, seed)
     ours, theirs = (once(each, scheme).mesh.vertices for each in (mesh, other))
     where = correspondence(mesh, other, order)[: len(ours)]
     np.testing.assert_allclose(theirs[where], ours, rtol=0, atol=1e-10)
