@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common import Creases, Mesh, ParameterError, loop, refine, subdivide
+from pns_common import Creases, Mesh, ParameterError, loop, refine
 from pns_common.interop.carried import CarriedMesh, join_by_position, refine_carried
 from tests.support.meshes import bumpy_sphere, grid
 
@@ -73,9 +73,3 @@ def test_by_index_vertices_in_one_place_stay_apart_and_keep_their_numbers():
         assert len(made.vertices) == 12
     with pytest.raises(ParameterError, match="weld"):
         refine_carried(mesh, loop(), 1, {"weld": "off"})
-
-
-def test_a_library_of_triangles_refuses_quads():
-    trimesh = pytest.importorskip("trimesh")
-    with pytest.raises(ParameterError, match="holds no quads"):
-        subdivide(trimesh.creation.box(), 1, "catmull-clark")
