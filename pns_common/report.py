@@ -11,8 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
-from pns_common.kernels import quads as of_quads
-from pns_common.mesh.topology import EdgeClass, Topology
+from pns_common.mesh.normals import face_normals
+from pns_common.mesh.quads import quad_faces
+from pns_common.mesh.rows import dot
+from pns_common.mesh.topology import EdgeClass, Topology, split_faces
 from pns_common.operator.formula import Additions
 from pns_common.parallel import Blocks
 
@@ -162,66 +164,19 @@ def child_angles(
         blocks: how work is shared.
         quads: whether each corner became a quad; else each triangle four.
     """
-    normals = _child_normals(parent, points, blocks, quads)
-    smooth_class = parent.edge_class
+    faces = quad_faces(parent, blocks) if quads else split_faces(parent, blocks)
+    normals, smooth = face_normals(points, faces, blocks), parent.edge_class
     if len(parent.soft):
-        smooth_class = np.where(parent.is_sharp, EdgeClass.CREASE, smooth_class).astype(np.int8)
-    of_mesh = parent.half_edges, smooth_class
-    if quads:
-        corners = parent.offsets, parent.face_of_corner
-        inside = blocks.run(
-            parent.face_count,
-            lambda begin, end: of_quads.largest_chord_inside(normals, parent.offsets, begin, end),
-        )
-        across = blocks.run(
-            len(parent.edges),
-            lambda begin, end: of_quads.largest_chord_across(
-                normals, *corners, *of_mesh, begin, end
-            ),
-        )
-    else:
-        inside = blocks.run(
-            parent.face_count,
-            lambda begin, end: children.largest_chord_inside(normals, begin, end),
-        )
-        across = blocks.run(
-            len(parent.edges),
-            lambda begin, end: children.largest_chord_across(normals, *of_mesh, begin, end),
-        )
+        smooth = np.where(parent.is_sharp, EdgeClass.CREASE, smooth).astype(np.int8)
+    read = parent.connectivity._replace(edge_class=smooth), quads, normals
+    inside = blocks.run(parent.face_count, children.largest_chord_inside, *read)
+    across = blocks.run(len(parent.edges), children.largest_chord_across, *read)
     flipped = 0
     if base_points is not None:
-        others = _child_normals(parent, base_points, blocks, quads)
-        flipped = sum(
-            blocks.run(
-                len(normals),
-                lambda begin, end: children.opposed_normals(normals, others, begin, end),
-            )
-        )
+        others = face_normals(base_points, faces, blocks)
+        flipped = int(np.count_nonzero(dot(normals, others) < 0))
     chord = max(*inside, *across, 0.0)
-    return ChildAngles(int(flipped), 2 * math.asin(min(math.sqrt(chord) / 2, 1.0)))
-
-
-def _child_normals(
-    parent: Topology, points: Float[np.ndarray, "W 3"], blocks: Blocks, quads: bool
-) -> Float[np.ndarray, "C 3"]:
-    count = parent.vertex_count
-    if quads:
-        normals = np.empty((len(parent.corners), 3))
-        of_faces = parent.corners, parent.offsets, parent.corner_edges
-        ends = count, count + len(parent.edges)
-        blocks.run(
-            parent.face_count,
-            lambda begin, end: of_quads.child_normals(
-                points, *of_faces, *ends, begin, end, normals
-            ),
-        )
-        return normals
-    normals = np.empty((4 * parent.face_count, 3))
-    read = points, parent.faces, parent.face_edges, count
-    blocks.run(
-        parent.face_count, lambda begin, end: children.child_normals(*read, begin, end, normals)
-    )
-    return normals
+    return ChildAngles(flipped, 2 * math.asin(min(math.sqrt(chord) / 2, 1.0)))
 
 
 def level_report(

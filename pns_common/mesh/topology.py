@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt32
 
 from pns_common.errors import MeshError, ParameterError
+from pns_common.kernels import Connectivity, loop, split
 from pns_common.kernels import connectivity as kernels
-from pns_common.kernels import loop
 from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
 STEPS = 32
-TRIANGLE = 3
+TRIANGLE, QUAD = 3, split.QUAD
 NO_WEIGHTS = np.zeros(0)
 # Edges of a sharpness above this count as sharp where there is only yes and no.
 MOSTLY_SHARP = 1 / 2
@@ -96,6 +96,14 @@ class Topology:
     wear: Float[np.ndarray, " W"] = field(default_factory=lambda: NO_WEIGHTS)
     found: Float[np.ndarray, " SW"] = field(default_factory=lambda: NO_WEIGHTS)
 
+    @cached_property
+    def connectivity(self) -> Connectivity:
+        """What loops read of a mesh."""
+        mesh = self
+        of_faces = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges
+        of_edges = mesh.edges, mesh.half_edges, mesh.edge_class
+        return Connectivity(mesh.vertex_count, *of_faces, *of_edges)
+
     @property
     def face_count(self) -> int:
         """Number of faces."""
@@ -147,9 +155,12 @@ class Topology:
         """Number of edges at each vertex that are not interior; (0,) where there is none."""
         if len(self.sharp_edges) == 0:
             return np.zeros(0, dtype=np.int32)
-        counts = np.zeros(self.vertex_count, dtype=np.int32)
-        kernels.count_ends(self.edges, self.sharp_edges, counts)
-        return counts
+        return self.count_ends(self.sharp_edges)
+
+    def count_ends(self, rows: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " V"]:
+        """Return how many of some edges end at each vertex."""
+        ends = self.edges[rows].reshape(-1)
+        return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
 
     @cached_property
     def sharpness(self) -> Float[np.ndarray, " E"]:
@@ -258,21 +269,11 @@ class Topology:
     def count_fans(self, blocks: Blocks) -> Integer[np.ndarray, " V"]:
         """Return how many fans the faces of each vertex form: 0, 1, or 2 for more."""
         corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
-        made = np.empty(self.vertex_count, dtype=np.int8)
-        blocks.owners(self.vertex_count).run(
-            self.vertex_count,
-            lambda begin, end: kernels.count_corners(
-                self.corners, self.corner_reach, begin, end, corner, count
-            ),
-        )
-        fans = self.offsets, self.face_of_corner, self.corner_edges, self.half_edges
-        blocks.run(
-            self.vertex_count,
-            lambda begin, end: kernels.count_fans(
-                *fans, self.edge_class, corner, count, begin, end, made
-            ),
-        )
-        return made
+        fans = np.empty(self.vertex_count, dtype=np.int8)
+        around = self.corners, self.corner_reach, corner, count
+        blocks.owners(len(fans)).run(len(fans), kernels.count_corners, *around)
+        blocks.run(len(fans), kernels.count_fans, self.connectivity, corner, count, fans)
+        return fans
 
     def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
@@ -453,9 +454,7 @@ def build_topology(
         repeating = kernels.mark_repeats(corners, offsets, last_face, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
     known = corners, face_of_corner, repeats if repeating else repeats[:0], half_edges
-    blocks.run(
-        len(edges), lambda begin, end: kernels.classify_edges(*known, begin, end, edge_class)
-    )
+    blocks.run(len(edges), kernels.classify_edges, *known, edge_class)
     return Topology(
         vertex_count,
         corners,
@@ -482,50 +481,54 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         blocks: how the work is shared.
         inherit: whether the halves of creases and soft edges inherit their sharpness.
     """
-    faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
-    worn = parent.worn_vertices(vertex_count)
+    return split_into(split_faces(parent, blocks), parent, blocks, inherit=inherit)
+
+
+def split_into(
+    faces: UInt32[np.ndarray, "C N"], parent: Topology, blocks: Blocks, *, inherit: bool
+) -> Topology:
+    """Return the topology of a split into faces: triangles in four, or each corner into a quad."""
+    quads, edge_count, count = faces.shape[1] != TRIANGLE, len(parent.edges), len(parent.corners)
+    vertex_count = parent.vertex_count + edge_count + (parent.face_count if quads else 0)
+    offsets = np.arange(0, faces.size + 1, faces.shape[1], dtype=np.int32)
     soft_corners = parent.soft_corners_of_split(vertex_count, inherit=inherit)
+    vertices = {
+        "vertex_sharpness": parent.worn_vertices(vertex_count),
+        "soft_corners": soft_corners,
+    }
     if not parent.plain:
-        made = build_topology(faces, vertex_count, blocks)
-        made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return (inheriting(made, parent) if inherit else made).worn(parent, inherit=inherit)
-    soft = parent.soft
-    source = parent if inherit else parent.without_creases()
-    face_count, edge_count = parent.face_count, len(parent.edges)
-    halves = np.empty((edge_count, 2), dtype=np.uint32)
-    arrays = parent.faces, parent.face_edges
-    blocks.run(
-        face_count,
-        lambda begin, end: kernels.number_halves(
-            *arrays, parent.edges, parent.half_edges, begin, end, halves
-        ),
-    )
-    count = 2 * edge_count + 3 * face_count
+        split_mesh = build_topology((faces.reshape(-1), offsets), vertex_count, blocks)
+        split_mesh = replace(split_mesh, **vertices)
+        if inherit:
+            split_mesh = inheriting(split_mesh, parent)
+        return split_mesh.worn(parent, inherit=inherit)
+    read = (parent if inherit else parent.without_creases()).connectivity
+    halves, corner_edges = np.empty((edge_count, 2), np.uint32), np.empty(faces.shape, np.uint32)
+    blocks.run(parent.face_count, split.number_halves, read, quads, halves)
+    # Each edge has two halves, and each corner an edge inside of its face.
+    count += 2 * edge_count
     edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
-    edge_class, face_edges = np.empty(count, np.int8), np.empty((4 * face_count, 3), np.uint32)
-    read = *arrays, source.half_edges, source.edge_class, halves, parent.vertex_count
-    to = face_edges, edges, half_edges, edge_class
-    blocks.run(face_count, lambda begin, end: kernels.split_edges(*read, begin, end, *to))
-    child_soft = NO_WEIGHTS
-    if inherit and len(soft):
-        child_soft = np.zeros(count)
-        rows = np.flatnonzero(soft)
-        child_soft[halves[rows]] = soft[rows, None]
-    made = Topology(
+    edge_class, soft = np.empty(count, np.int8), NO_WEIGHTS
+    write = split.split_edges_into_quads if quads else split.split_edges_of_triangles
+    to = corner_edges, edges, half_edges, edge_class
+    blocks.run(parent.face_count, write, read, halves, *to)
+    if inherit and len(parent.soft):
+        rows, soft = np.flatnonzero(parent.soft), np.zeros(count)
+        soft[halves[rows]] = parent.soft[rows, None]
+    split_mesh = Topology(
         vertex_count,
         faces.reshape(-1),
-        np.arange(0, faces.size + 1, TRIANGLE, dtype=np.int32),
-        NO_FACES,
+        offsets,
+        np.repeat(np.arange(len(faces), dtype=np.uint32), QUAD) if quads else NO_FACES,
         edges,
-        face_edges.reshape(-1),
+        corner_edges.reshape(-1),
         half_edges,
         edge_class,
-        child_soft,
-        worn,
+        soft,
         plain=True,
-        soft_corners=soft_corners,
+        **vertices,
     )
-    return made.worn(parent, halves, inherit=inherit)
+    return split_mesh.worn(parent, halves, inherit=inherit)
 
 
 def inheriting(made: Topology, parent: Topology) -> Topology:
@@ -543,9 +546,8 @@ def split_faces(
     parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
 ) -> Integer[np.ndarray, "C 3"]:
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
-    faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
-    read = parent.faces, parent.face_edges, parent.vertex_count
-    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
+    faces = np.empty((4 * len(parent.faces), TRIANGLE), dtype=dtype)
+    blocks.run(parent.face_count, split.split_triangles, parent.connectivity, faces)
     return faces
 
 
@@ -592,9 +594,7 @@ def _number_edges(
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
     edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
-    blocks.quiet().run(
-        made, lambda begin, end: kernels.read_links(low, links, begin, end, edges, half_edges)
-    )
+    blocks.quiet().run(made, kernels.read_links, low, links, edges, half_edges)
     return edges, half_edges, corner_edges, bool(plain[0])
 
 

@@ -37,7 +37,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
-from pns_common.kernels import children, correction, directed, frames, measures, quads
+from pns_common.kernels import children, correction, directed, frames, measures
 from pns_common.mesh.topology import Topology
 from pns_common.model.features import FeatureSet
 from pns_common.operator.curves import Curves, curve_prior, curve_pushes, find_curves
@@ -141,8 +141,8 @@ def paper_level(level: Level, rule: PaperRule) -> Additions:
 
     def correct(begin: int, end: int) -> int:
         at = edge_inputs(level, rule, mesh.interior[begin:end])
-        read = at.rows, count, 0, len(at.rows), answers(rule.network, at), at.basis
-        correction.correct_by_equation_1(*read, at.gate, at.bound, *made.arrays)
+        read = at.rows, count, answers(rule.network, at), at.basis, at.gate, at.bound
+        correction.correct_by_equation_1(*read, *made.arrays)
         return int(at.degenerate.sum())
 
     degenerate: int = sum(blocks.run(len(mesh.interior), correct))
@@ -160,8 +160,8 @@ def edge_inputs(level: Level, rule: PaperRule, rows: Integer[np.ndarray, " N"]) 
     fields = level.rings.fields if seen.rings else np.zeros((0, measures.FIELDS))
     frames.frames_and_features(
         *(level.points, level.normals, fields, level.edges.lengths, level.logs),
-        *(mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges, rows, 0, count),
-        *(rule.symmetric, seen.starts, basis, curvature, length, degenerate, features),
+        *(mesh.connectivity, rows, rule.symmetric, seen.starts),
+        *(basis, curvature, length, degenerate, features),
     )
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     bound = rule.budget / _unit_length(level) * (length * length)
@@ -249,11 +249,7 @@ def directed_level(level: Level, rule: DirectedRule) -> Additions:
         asked, firsts, around.rows, around.gates, around.bounds, around.lengths, strict=True
     ):
         read = rows, first, u, rule.network_scale * h, gate, bound
-
-        def correct(begin: int, end: int, read: Any = read) -> None:
-            correction.correct_from_flat(*read[:2], begin, end, *read[2:], *made.arrays)
-
-        level.blocks.run(len(rows), correct)
+        level.blocks.run(len(rows), correction.correct_from_flat, *read, *made.arrays)
     curves = find_curves(level.points, mesh.without_soft(), len(x))
     if len(curves.new_rows):
         along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
@@ -272,7 +268,7 @@ def surroundings(
     """Return what surrounds the network's answers; ``base_points`` are x0."""
     mesh, seen, points = level.topology, level.unmarked, level.points
     flat = np.empty_like(base_points)
-    correction.place_flat(points, mesh.edges, mesh.edge_class, level.ringed, base_points, flat)
+    correction.place_flat(points, mesh.connectivity, level.ringed, base_points, flat)
     lengths, squares = seen.edges.lengths, seen.rings.means[:, measures.SQUARE]
     faces, of_faces = np.arange(mesh.face_count if level.base.polygons else 0), np.zeros(0)
     if len(faces):
@@ -320,8 +316,7 @@ def spread_gates(
     """Return what ``kernels.directed.spread_gates`` makes of the gates of edges."""
     opened, at_vertices = np.zeros(mesh.face_count), np.zeros(mesh.vertex_count)
     most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
-    of_mesh = mesh.corners, mesh.offsets, mesh.corner_edges
-    directed.spread_gates(*of_mesh, of_edges, opened, at_vertices, most, least)
+    directed.spread_gates(mesh.connectivity, of_edges, opened, at_vertices, most, least)
     return opened, at_vertices, most, least
 
 
@@ -358,27 +353,13 @@ def guard_scale(
     It bounds the turns between neighbours too. With normals n, n' of two children and m, m' of
     their counterparts, ∠(n, n') ≤ ∠(n, m) + ∠(m, m') + ∠(m', n') ≤ ∠(m, m') + 2 ``angle``.
     """
-    mesh = level.topology
+    faces, cosine = level.base.faces(level.topology, level.blocks.quiet()), math.cos(angle)
     scale, changed = np.ones(len(delta)), EVERYWHERE
     shared = curves.shared if curves.shared.any() else NONE_SHARED
-    blocks = level.blocks.quiet()
-    mark = quads.mark_folds if level.base.polygons else children.mark_folds
-    of_mesh = (
-        mesh.corners,
-        mesh.offsets,
-        mesh.corner_edges,
-        mesh.vertex_count,
-        mesh.vertex_count + len(mesh.edges),
-    )
-    if not level.base.polygons:
-        of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
     for rounds in rounds_from_0():
         touched = np.zeros(len(delta), dtype=bool)
-        read = base_points, delta, scale, shared, changed, math.cos(angle)
-        blocks.run(
-            mesh.face_count,
-            lambda begin, end: mark(*read, *of_mesh, begin, end, touched),  # noqa: B023
-        )
+        read = faces, base_points, delta, scale, shared, changed, cosine
+        level.blocks.quiet().run(len(faces), children.mark_folds, *read, touched)
         rows = np.flatnonzero(touched)
         if len(rows) == 0:
             return scale

@@ -46,23 +46,13 @@ def _place_three(
 ) -> Float[np.ndarray, "W 3"]:
     count, edge_count = topology.vertex_count, len(topology.edges)
     placed = np.empty((count + edge_count, WIDTH))
-    read = points, topology.corners, topology.edges, topology.half_edges, topology.edge_class
-    blocks.run(
-        edge_count,
-        lambda begin, end: kernels.place_edges(*read, topology.soft, begin, end, placed[count:]),
-    )
     vertices, valence = placed[:count], np.empty(count, dtype=np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: kernels.sum_rings(
-            points, topology.edges, topology.edge_reach, begin, end, vertices, valence
-        ),
-    )
+    read = points, topology.connectivity, topology.soft
+    blocks.run(edge_count, kernels.place_edges, *read, placed[count:])
+    ring = points, topology.edges, topology.edge_reach, vertices, valence
+    blocks.owners(count).run(count, kernels.sum_rings, *ring)
     weights = _beta_table(int(valence.max(initial=0)))
-    blocks.run(
-        count,
-        lambda begin, end: kernels.blend_rings(points, valence, weights, begin, end, vertices),
-    )
+    blocks.run(count, kernels.blend_rings, points, valence, weights, vertices)
     sharp = topology.sharpest
     if sharp is not None:
         curve = kernels.CURVE_CENTRE, kernels.CURVE_NEIGHBOUR

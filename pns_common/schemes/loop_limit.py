@@ -36,19 +36,16 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
+from pns_common.mesh.rows import ranges
 from pns_common.mesh.sectors import (
     CLOSED,
-    CORNER,
     CURVE,
     DART,
     LimitNormals,
     find_sectors,
     mask_tables,
-    normals_of_sectors,
-    sector_kinds,
-    walked_arrays,
+    sector_normals,
 )
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
@@ -66,15 +63,7 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    around = find_sectors(topology)
-    kind = sector_kinds(topology, around)
-    at, weights = mask_tables(tangent_mask, kind, around.size)
-    sectors = np.empty((len(around.first), 3))
-    read = *walked_arrays(topology), around.first, around.size, at, weights, kind == CORNER
-    blocks.run(
-        len(sectors), lambda begin, end: kernels.sector_normals(points, *read, begin, end, sectors)
-    )
-    return normals_of_sectors(sectors, around, topology.vertex_count)
+    return sector_normals(points, topology, find_sectors(topology), tangent_mask, blocks)
 
 
 # --- positions ------------------------------------------------------------------------------------
@@ -86,18 +75,11 @@ def limit_positions(
     """Return the limits of three columns."""
     count, sharp = topology.vertex_count, topology.sharpest
     limits, valence = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: masks.sum_rings(
-            points, topology.edges, topology.edge_reach, begin, end, limits, valence
-        ),
-    )
+    ring = points, topology.edges, topology.edge_reach, limits, valence
+    blocks.owners(count).run(count, masks.sum_rings, *ring)
     valences = np.arange(int(valence.max(initial=0)) + 1)
     weight = limit_ring_weight(valences) / np.maximum(valences, 1)
-    blocks.run(
-        count,
-        lambda begin, end: masks.blend_rings(points, valence, weight, begin, end, limits),
-    )
+    blocks.run(count, masks.blend_rings, points, valence, weight, limits)
     if sharp is None:
         return limits
     darts = np.flatnonzero(topology.sharp_count == DART)
@@ -122,9 +104,12 @@ def _dart_limits(
     sums[darts] = 2 * (points[topology.sharpest.neighbours[darts, 0]] - points[darts])
     total[darts] = 2
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
-    at, weights = mask_tables(dart_weights, rows < around.opened, around.size[rows])
-    read = around.first, around.size, at, weights, rows
-    kernels.sum_darts(points, *walked_arrays(topology), *read, sums, total)
+    size = around.size[rows]
+    at, tables = mask_tables(dart_weights, rows < around.opened, size)
+    p, q = np.repeat(around.vertex[rows], size), around.spokes[ranges(around.starts[rows], size)]
+    weights = tables[ranges(at, size)]
+    np.add.at(total, p, weights)
+    np.add.at(sums, p, weights[:, None] * (points[q] - points[p]))
     scale = beta_of_darts / (1 + beta_of_darts * total[darts, None])
     return points[darts] + scale * sums[darts]
 
