@@ -46,7 +46,7 @@ class Step:
         base_points = None if self.added is None else self.added.base_points
         quads, shift = self.level.base.polygons, crease_shift(self.level, self.points)
         angles = child_angles(mesh, self.points, base_points, blocks, quads)
-        return level_report(mesh, self.added, angles, shift, quads)
+        return level_report(mesh, self.added, *angles, shift, quads)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
@@ -140,22 +139,14 @@ class Report(LimitDistances):
     adaptive: NotRequired[AdaptiveReport]
 
 
-@dataclass(frozen=True)
-class ChildAngles:
-    """Number of flipped children, and the largest angle between children in radians."""
-
-    flipped: int
-    normal_jump_max: float
-
-
 def child_angles(
     parent: Topology,
     points: Float[np.ndarray, "W 3"],
     base_points: Float[np.ndarray, "W 3"] | None,
     blocks: Blocks,
     quads: bool,
-) -> ChildAngles:
-    """Measure the children of a mesh's faces.
+) -> tuple[int, float]:
+    """Return how many children are flipped, and the largest angle between children in radians.
 
     Args:
         parent: the mesh that was split.
@@ -176,13 +167,14 @@ def child_angles(
         others = face_normals(base_points, faces, blocks)
         flipped = int(np.count_nonzero(dot(normals, others) < 0))
     chord = max(*inside, *across, 0.0)
-    return ChildAngles(flipped, 2 * math.asin(min(math.sqrt(chord) / 2, 1.0)))
+    return flipped, 2 * math.asin(min(math.sqrt(chord) / 2, 1.0))
 
 
 def level_report(
     parent: Topology,
     added: Additions | None,
-    angles: ChildAngles,
+    flipped: int,
+    jump: float,
     crease_shift: float | None,
     quads: bool,
 ) -> LevelReport:
@@ -197,29 +189,22 @@ def level_report(
         "faces": len(parent.corners) if quads else 4 * parent.face_count,
         "edges": edge_counts(parent),
         "degenerate_frames": 0 if added is None else added.degenerate,
-        "flipped_faces": angles.flipped,
+        "flipped_faces": flipped,
         "proximity_ratio": _ratio_summary(ratio),
         "gate": _gate_summary(gate),
-        "normal_jump_max": angles.normal_jump_max,
+        "normal_jump_max": jump,
     }
     if added is not None:
         shut = _shut(gate)
         if added.corrected is not None:
             vertex_gate = _of(added.gate[:count], added.corrected)
-            report["vertex_rule"] = {
-                "vertices": int(added.corrected.sum()),
-                "proximity_ratio": _ratio_summary(_of(added.ratio[:count], added.corrected)),
-                "gate": _gate_summary(vertex_gate),
-            }
+            ratio = _of(added.ratio[:count], added.corrected)
+            report["vertex_rule"] = _vertex_summary(ratio, vertex_gate)
             shut += _shut(vertex_gate)
             if quads:
-                first = count + len(parent.edges)
-                report["face_rule"] = {
-                    "vertices": parent.face_count,
-                    "proximity_ratio": _ratio_summary(added.ratio[first:]),
-                    "gate": _gate_summary(added.gate[first:]),
-                }
-                shut += _shut(added.gate[first:])
+                ratio, gate = (rows[of_edges.stop :] for rows in (added.ratio, added.gate))
+                report["face_rule"] = _vertex_summary(ratio, gate)
+                shut += _shut(gate)
         report["displacement_max"] = longest(added.displacement)
         report["envelope_max"] = float(added.bound.max(initial=0))
         report["shut"] = shut
@@ -274,6 +259,11 @@ def _of(
     """Return some of the values; no copy where they are all."""
     every = rows.all() if rows.dtype == bool else len(rows) == len(values)
     return values if every else values[rows]
+
+
+def _vertex_summary(ratio: Float[np.ndarray, " N"], gate: Float[np.ndarray, " N"]) -> VertexSummary:
+    ratios, gates = _ratio_summary(ratio), _gate_summary(gate)
+    return {"vertices": len(gate), "proximity_ratio": ratios, "gate": gates}
 
 
 def _shut(gate: Float[np.ndarray, " N"]) -> int:

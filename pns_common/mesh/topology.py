@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Integer, UInt32
 from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import Connectivity, loop, split
 from pns_common.kernels import connectivity as kernels
+from pns_common.mesh.rows import marked
 from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
@@ -25,6 +26,11 @@ NO_WEIGHTS = np.zeros(0)
 # Edges of a sharpness above this count as sharp where there is only yes and no.
 MOSTLY_SHARP = 1 / 2
 NO_FACES = np.zeros(0, dtype=np.uint32)
+
+
+def some_weights(weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " W"]:
+    """Return weights; (0,) where all are 0."""
+    return weights if weights.any() else NO_WEIGHTS
 
 
 class EdgeClass(IntEnum):
@@ -98,11 +104,8 @@ class Topology:
 
     @cached_property
     def connectivity(self) -> Connectivity:
-        """What loops read of a mesh."""
-        mesh = self
-        of_faces = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges
-        of_edges = mesh.edges, mesh.half_edges, mesh.edge_class
-        return Connectivity(mesh.vertex_count, *of_faces, *of_edges)
+        """The arrays that loops read."""
+        return Connectivity(*(getattr(self, name) for name in Connectivity._fields))
 
     @property
     def face_count(self) -> int:
@@ -178,10 +181,10 @@ class Topology:
     @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
-        made = np.zeros(self.vertex_count)
+        weights = np.zeros(self.vertex_count)
         if len(self.vertex_sharpness):
-            made = np.minimum(self.vertex_sharpness, 1.0)
-        return np.maximum(made, self.soft_corners) if len(self.soft_corners) else made
+            weights = np.minimum(self.vertex_sharpness, 1.0)
+        return np.maximum(weights, self.soft_corners) if len(self.soft_corners) else weights
 
     @property
     def has_corners(self) -> bool:
@@ -233,8 +236,8 @@ class Topology:
             on_boundary = classes == kernels.BOUNDARY
             if on_boundary.any():
                 ends = np.unique(self.edges[on_boundary])
-                marked = np.where(self.wear > 0, soft, 0.0) if len(self.wear) else NO_WEIGHTS
-                at_ends, beside = self._sharpest_of(classes, marked)
+                given = np.where(self.wear > 0, soft, 0.0) if len(self.wear) else NO_WEIGHTS
+                at_ends, beside = self._sharpest_of(classes, given)
                 weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
         return weights, neighbours
 
@@ -288,22 +291,20 @@ class Topology:
 
         Those of w = 1 are creases.
         """
-        made = self.with_creases(np.flatnonzero(sharpness >= 1))
-        soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
-        if len(self.soft):
-            soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
-        made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        sharper = self.with_creases(np.flatnonzero(sharpness >= 1))
+        soft = np.maximum(sharpness, self.soft) if len(self.soft) else sharpness
+        soft = np.where(sharper.edge_class == kernels.INTERIOR, soft, 0.0)
+        found = self.found
         if len(self.wear):
             found = np.where((self.wear > 0) & np.isfinite(self.wear), sharpness, 0.0)
-            made = replace(made, found=found if found.any() else NO_WEIGHTS)
-        return made
+        return replace(sharper, soft=some_weights(soft), found=some_weights(found))
 
     def with_wear(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
         """Return a copy whose interior edges are sharp for so many levels, infinity for good."""
-        made = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
-        made = made.with_sharpness(np.minimum(sharpness, 1.0))
+        lasting = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
+        sharper = lasting.with_sharpness(np.minimum(sharpness, 1.0))
         wear = np.where(self.edge_class == kernels.INTERIOR, sharpness, 0.0)
-        return replace(made, wear=wear if wear.any() else NO_WEIGHTS)
+        return replace(sharper, wear=some_weights(wear))
 
     def worn(
         self,
@@ -321,20 +322,20 @@ class Topology:
             return self
         rows = np.flatnonzero(parent.wear)
         if halves is None:
-            own = self.rows_of(halves_of(parent, rows)).reshape(-1, 2)
+            worn = self.rows_of(halves_of(parent, rows)).reshape(-1, 2)
         else:
-            own = halves[rows].astype(np.int64)
-        classes, soft, left = self.edge_class.copy(), self.soft.copy(), np.zeros(len(self.edges))
-        classes[own] = kernels.INTERIOR
+            worn = halves[rows].astype(np.int64)
+        classes, soft = self.edge_class.copy(), self.soft.copy()
+        classes[worn] = kernels.INTERIOR
         if len(soft):
-            soft[own] = 0.0
-        left[own] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
-        made = replace(self, edge_class=classes, soft=soft).with_wear(left)
+            soft[worn] = 0.0
+        left, found = np.zeros((2, len(self.edges)))
+        left[worn] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
+        split_mesh = replace(self, edge_class=classes, soft=soft).with_wear(left)
         if inherit and len(parent.found):
-            found = np.zeros(len(self.edges))
-            found[own] = parent.found[rows][:, None]
-            made = made.with_sharpness(found)
-        return made
+            found[worn] = parent.found[rows][:, None]
+            split_mesh = split_mesh.with_sharpness(found)
+        return split_mesh
 
     def with_border(self, rule: str) -> Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
@@ -350,7 +351,7 @@ class Topology:
         """Return a copy whose vertices are so sharp, where they are less."""
         if len(self.vertex_sharpness):
             sharpness = np.maximum(sharpness, self.vertex_sharpness)
-        return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
+        return replace(self, vertex_sharpness=some_weights(sharpness))
 
     def with_soft_corners(self, weights: Float[np.ndarray, " V"]) -> Topology:
         """Return a copy with learned corner weights, where they are less."""
@@ -361,12 +362,12 @@ class Topology:
     def soft_corners_of_split(self, count: int, *, inherit: bool) -> Float[np.ndarray, " SV"]:
         """Return ``soft_corners`` a level later, where there are ``count`` vertices.
 
-        Those of weight 1, as where a border turns, stay for good.
+        Those of weight 1, as where a boundary turns, stay for good.
         """
-        kept = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
-        if not (kept.any() or (inherit and len(kept))):
+        weights = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
+        if not (weights.any() or (inherit and len(weights))):
             return NO_WEIGHTS
-        return np.concatenate([kept, np.zeros(count - self.vertex_count)])
+        return np.concatenate([weights, np.zeros(count - self.vertex_count)])
 
     def worn_vertices(self, count: int) -> Float[np.ndarray, " K"]:
         """Return ``vertex_sharpness`` a level later, where there are ``count`` vertices."""
@@ -396,24 +397,19 @@ class Topology:
             ParameterError: a pair is no edge; ``name`` is the argument's.
         """
         check_vertices(name, pairs, self.vertex_count)
-        named = np.zeros(self.vertex_count, dtype=bool)
-        named[pairs.reshape(-1)] = True
+        named = marked(pairs, self.vertex_count)
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
         keys, asked = (_keys(ends, self.vertex_count) for ends in (self.edges[near], pairs))
         order = np.argsort(keys, kind="stable")
-        if len(near) == 0:
-            found = np.zeros(len(asked), dtype=bool)
-            place = np.zeros(len(asked), dtype=np.int64)
-        else:
-            place = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
-            found = keys[place] == asked
+        place = np.searchsorted(keys, asked, sorter=order)
+        found = np.append(keys[order], -1)[place] == asked
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
             raise ParameterError(
                 f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
             )
-        return near[place]
+        return near[order[place]]
 
 
 def build_topology(
@@ -500,7 +496,11 @@ def split_into(
         split_mesh = build_topology((faces.reshape(-1), offsets), vertex_count, blocks)
         split_mesh = replace(split_mesh, **vertices)
         if inherit:
-            split_mesh = inheriting(split_mesh, parent)
+            soft, creases = np.flatnonzero(parent.soft), parent.crease_edges
+            halves = split_mesh.rows_of(halves_of(parent, np.concatenate([soft, creases])))
+            sharpness = np.zeros(len(split_mesh.edges))
+            sharpness[halves] = np.append(parent.soft[soft], np.ones(len(creases))).repeat(2)
+            split_mesh = split_mesh.with_sharpness(sharpness)
         return split_mesh.worn(parent, inherit=inherit)
     read = (parent if inherit else parent.without_creases()).connectivity
     halves, corner_edges = np.empty((edge_count, 2), np.uint32), np.empty(faces.shape, np.uint32)
@@ -529,17 +529,6 @@ def split_into(
         **vertices,
     )
     return split_mesh.worn(parent, halves, inherit=inherit)
-
-
-def inheriting(made: Topology, parent: Topology) -> Topology:
-    """Return the topology of a split in which the halves of edges have their sharpness."""
-    made = made.with_creases(made.rows_of(halves_of(parent, parent.crease_edges)))
-    if len(parent.soft):
-        rows = np.flatnonzero(parent.soft)
-        sharpness = np.zeros(len(made.edges))
-        sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(parent.soft[rows], 2)
-        made = made.with_sharpness(sharpness)
-    return made
 
 
 def split_faces(

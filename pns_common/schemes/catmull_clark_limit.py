@@ -37,7 +37,6 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
-from pns_common.kernels import loop
 from pns_common.mesh.rows import ranges
 from pns_common.mesh.sectors import (
     CLOSED,
@@ -50,10 +49,9 @@ from pns_common.mesh.sectors import (
 )
 from pns_common.mesh.topology import NO_WEIGHTS, Topology
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH
+from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
 from pns_common.schemes.catmull_clark_masks import place
 
-CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 4.0, (7 - 45**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -70,23 +68,20 @@ def limit_positions(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
-    mesh, count, sharp = topology, topology.vertex_count, topology.sharpest
+    mesh, count = topology, topology.vertex_count
     none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
     smooth = replace(mesh, **none)
     placed = place(points, smooth, blocks)
     sums, read = np.empty((count, WIDTH + 1)), (placed, mesh.connectivity, mesh.corner_reach)
     blocks.owners(count).run(count, kernels.sum_limit_corners, *read, sums)
     limits = sums[:, :WIDTH].copy()
-    if sharp is None:
-        return limits
     # Without an edge of sharpness 1 nothing is counted.
     darts = np.flatnonzero(mesh.sharp_count == DART)
     darts = darts[sums[darts, WIDTH] >= kernels.LEAST_CORNERS]
     if len(darts):
         weight = sums[:, WIDTH] ** 2
         limits[darts] = _dart_limits(placed, weight, mesh)[darts]
-    curve = CURVE_CENTRE, CURVE_NEIGHBOUR
-    loop.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, limits)
+    follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
 

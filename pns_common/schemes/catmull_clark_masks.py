@@ -20,10 +20,9 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
-from pns_common.kernels import loop
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH, in_threes
+from pns_common.schemes.base_scheme import CURVE, WIDTH, follow_curves, in_threes
 
 
 def place(
@@ -46,8 +45,5 @@ def _place_three(
     around = points, at_faces, read, mesh.corner_reach
     blocks.owners(count).run(count, kernels.sum_corners, *around, vertices, counts)
     blocks.run(count, kernels.blend_corners, points, counts, vertices)
-    sharp = mesh.sharpest
-    if sharp is not None:
-        curve = loop.CURVE_CENTRE, loop.CURVE_NEIGHBOUR
-        loop.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, vertices)
+    follow_curves(points, topology, CURVE, vertices)
     return placed

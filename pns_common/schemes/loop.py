@@ -26,9 +26,16 @@ from jaxtyping import Float
 from pns_common.kernels import loop as kernels
 from pns_common.mesh.topology import Topology, split_triangles
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH, BaseScheme, Limit, in_threes
+from pns_common.schemes.base_scheme import (
+    CURVE,
+    WIDTH,
+    BaseScheme,
+    Limit,
+    follow_curves,
+    in_threes,
+)
 from pns_common.schemes.loop_limit import limit_normals, limit_positions
-from pns_common.schemes.loop_weights import beta, limit_ring_weight
+from pns_common.schemes.loop_weights import beta
 
 KEPT = 64
 
@@ -53,10 +60,7 @@ def _place_three(
     blocks.owners(count).run(count, kernels.sum_rings, *ring)
     weights = _beta_table(int(valence.max(initial=0)))
     blocks.run(count, kernels.blend_rings, points, valence, weights, vertices)
-    sharp = topology.sharpest
-    if sharp is not None:
-        curve = kernels.CURVE_CENTRE, kernels.CURVE_NEIGHBOUR
-        kernels.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, vertices)
+    follow_curves(points, topology, CURVE, vertices)
     return placed
 
 
@@ -70,5 +74,5 @@ def _kept_betas() -> Float[np.ndarray, " K"]:
     return beta(np.arange(KEPT))
 
 
-LIMIT = Limit(limit_positions, limit_normals, limit_ring_weight)
+LIMIT = Limit(limit_positions, limit_normals)
 LOOP = BaseScheme("loop", place, split_triangles, limit=LIMIT)

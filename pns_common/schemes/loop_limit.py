@@ -49,10 +49,9 @@ from pns_common.mesh.sectors import (
 )
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH
+from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
 from pns_common.schemes.loop_weights import beta, limit_ring_weight
 
-CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 # Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -73,20 +72,17 @@ def limit_positions(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
-    count, sharp = topology.vertex_count, topology.sharpest
+    count = topology.vertex_count
     limits, valence = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
     ring = points, topology.edges, topology.edge_reach, limits, valence
     blocks.owners(count).run(count, masks.sum_rings, *ring)
     valences = np.arange(int(valence.max(initial=0)) + 1)
     weight = limit_ring_weight(valences) / np.maximum(valences, 1)
     blocks.run(count, masks.blend_rings, points, valence, weight, limits)
-    if sharp is None:
-        return limits
     darts = np.flatnonzero(topology.sharp_count == DART)
     if len(darts):
         limits[darts] = _dart_limits(points, topology, darts, beta(valence[darts])[:, None])
-    curve = CURVE_CENTRE, CURVE_NEIGHBOUR
-    masks.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, limits)
+    follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
 
