@@ -71,15 +71,12 @@ def test_of_a_key_of_256_random_bits_a_hash_is_kept():
     first, second = new_key("studio"), new_key("studio")
     assert first != second
     assert len(first) == len("pns_studio_") + 43
+    for name in ("", "-a", "A", "a_b", "a" * 64, "a b", 'a"'):
+        with pytest.raises(KeysError, match="a name is"):
+            new_key(name)
     # As `printf %s KEY | sha256sum` writes it: FIPS 180's first example.
     of_abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     assert hash_of("abc") == f"sha256:{of_abc}"
-
-
-@pytest.mark.parametrize("name", ["", "-a", "A", "a_b", "a" * 64, "a b", 'a"'])
-def test_a_name_is_plain(name):
-    with pytest.raises(KeysError, match="a name is"):
-        new_key(name)
 
 
 @pytest.mark.parametrize(
@@ -132,6 +129,9 @@ def test_what_costs_something_needs_a_key(client):
         assert answer.json()["code"] == "unauthorized"
     for path in "/healthz", "/docs", "/openapi.json", "/models", "/":
         assert client.get(path).status_code == 200, path
+    for scheme in ("Bearer", "bearer", "BEARER "):
+        headers = GLB | {"Authorization": f"{scheme} {KEY}"}
+        assert client.post("/subdivide", content=b"x", headers=headers).content == b"x"
 
 
 def test_limits_are_those_of_the_key_that_is_sent(client):
@@ -157,12 +157,6 @@ def test_a_target_with_a_host_needs_a_key_whatever_its_path(keys_file):
     assert statuses == [401, 401, 400]
 
 
-@pytest.mark.parametrize("scheme", ["Bearer", "bearer", "BEARER "])
-def test_the_bearer_of_a_key_is_served(client, scheme):
-    headers = GLB | {"Authorization": f"{scheme} {KEY}"}
-    assert client.post("/subdivide", content=b"x", headers=headers).content == b"x"
-
-
 @pytest.mark.parametrize(
     "authorization",
     [
@@ -177,22 +171,13 @@ def test_the_bearer_of_a_key_is_served(client, scheme):
         f"Bearer {KEY}x",
     ],
 )
-def test_a_wrong_key_is_refused_wherever_it_is_sent(client, authorization):
-    answer = client.get("/healthz", headers={"Authorization": authorization})
-    assert answer.status_code == 401
+def test_a_wrong_key_is_refused_wherever_it_is_sent_and_locks_nobody_out(client, authorization):
+    for _ in range(40):
+        answer = client.get("/healthz", headers={"Authorization": authorization})
+        assert answer.status_code == 401
     assert KEY not in answer.text
-
-
-def test_however_many_wrong_keys_come_a_right_one_is_served(keys_file):
-    """From the same address and of the same name, and by one that was not seen before."""
-    client = obeying(keys_file=keys_file)
-    wrong = [
-        client.get("/healthz", headers=bearer(f"pns_studio_{n:043d}")).status_code
-        for n in range(200)
-    ]
-    assert wrong == [401] * 200
-    for key in (KEY, OTHER):
-        assert client.get("/healthz", headers=bearer(key)).status_code == 200
+    # However many came from its address and of its name.
+    assert client.get("/healthz", headers=bearer(KEY)).status_code == 200
 
 
 def test_the_routes_see_the_name_of_the_key(client, caplog):
@@ -278,6 +263,9 @@ def test_a_form_of_another_origin_is_refused_before_its_work(sent, origins, stat
     assert client.post("/report", headers=sent).status_code == status
     assert asked == ["POST"] * (status == 200)
     assert client.get("/models", headers=sent).status_code == 200
+    if status == 403 and not origins:
+        whole = obeying().post("/report", headers=sent, files={"file": ("a.glb", b"glTF")})
+        assert (whole.status_code, whole.json()["code"]) == (403, "foreign-origin")
 
 
 OWN = ("localhost", "pns.localhost:8000", "127.0.0.1:8000", "192.0.2.7", "[::1]:8000")
@@ -312,12 +300,6 @@ def test_only_the_names_of_the_service_are_served(listens, settings, host, statu
     assert answer.status_code == status
     if status != 200:
         assert answer.json()["code"] == "unknown-host"
-
-
-def test_the_service_refuses_such_a_form():
-    form = {"files": {"file": ("a.glb", b"glTF")}}
-    answer = obeying().post("/report", headers={"Sec-Fetch-Site": "cross-site"}, **form)
-    assert (answer.status_code, answer.json()["code"]) == (403, "foreign-origin")
 
 
 def test_no_answer_is_for_a_browser_to_guess():
