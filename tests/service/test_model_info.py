@@ -1,15 +1,11 @@
 """`pns info`: the bundled models side by side, and a card with all that it holds."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from pns_common.model.file import DEFAULT_MODEL, load_model, model_from_bytes
-from pns_common.model.session import OnnxModel
 from service.model_info import print_model, print_models
 from tests.support.networks import default_model_bytes
 
@@ -25,19 +21,17 @@ NESTED = {
 
 
 @pytest.fixture
-def vertices() -> OnnxModel:
+def vertices():
     return model_from_bytes(default_model_bytes(0, gate_sharpness=40.0, budget=0.25), "vertices")
 
 
-def with_card(model: OnnxModel, name: str | None = None, **changes: Any) -> OnnxModel:
+def with_card(model, name=None, **changes):
     other = copy.copy(model)
     other.card, other.name = replace(model.card, **changes), name or model.name
     return other
 
 
-def test_models_are_compared_in_80_columns(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, vertices: OnnxModel
-) -> None:
+def test_models_are_compared_in_80_columns(capsys, monkeypatch, vertices):
     monkeypatch.setenv("COLUMNS", "80")
     long = with_card(vertices, "symmetric-signed", metrics=NESTED)
     print_models([load_model("paper"), long, vertices])
@@ -52,7 +46,7 @@ def test_models_are_compared_in_80_columns(
     assert rows[long.name][4:] == ["+50.0", "+50.0", "–"]
 
 
-def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_default_alone_is_marked(capsys):
     default = load_model()
     print_models([default, with_card(default, "other")])
     lines = capsys.readouterr().out.splitlines()
@@ -60,7 +54,7 @@ def test_the_default_alone_is_marked(capsys: pytest.CaptureFixture[str]) -> None
     assert any(line.startswith(f"{DEFAULT_MODEL} *") for line in lines)
 
 
-def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_that_a_card_says_is_shown(capsys):
     model = load_model("general")
     print_model(model)
     shown = {line.strip("│┃ ") for line in capsys.readouterr().out.splitlines()}
@@ -73,9 +67,7 @@ def test_all_that_a_card_says_is_shown(capsys: pytest.CaptureFixture[str]) -> No
         assert any(label.startswith(name.replace("_", " ")) for label in told), name
 
 
-def test_metrics_are_shown_however_deep_they_lie(
-    capsys: pytest.CaptureFixture[str], vertices: OnnxModel
-) -> None:
+def test_metrics_are_shown_however_deep_they_lie(capsys, vertices):
     print_model(with_card(vertices, metrics=NESTED, training={"stages": {"first": {"steps": 11}}}))
     shown = capsys.readouterr().out
     for value in ("0.25", "50", "0.125", "0.0625", "[1.5, 1.25]", "1.75", "0.375", "11"):

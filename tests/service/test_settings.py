@@ -1,7 +1,5 @@
 """Every setting: from the environment, from the constructor, and within its range."""
 
-from __future__ import annotations
-
 from ipaddress import ip_network
 from pathlib import Path
 
@@ -49,18 +47,18 @@ EXAMPLES = {
 }
 
 
-def test_every_setting_has_an_example_here() -> None:
+def test_every_setting_has_an_example_here():
     assert set(EXAMPLES) == set(Settings.model_fields)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_read_from_the_environment(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_read_from_the_environment(name, monkeypatch):
     text, value = EXAMPLES[name]
     monkeypatch.setenv(f"PNS_{name.upper()}", text)
     assert getattr(Settings(), name) == value
 
 
-def test_job_limits_are_the_settings() -> None:
+def test_job_limits_are_the_settings():
     limits = Settings(faces=10, memory=20, json_items=30).job_limits()
     assert (limits.max_faces, limits.max_memory_bytes, limits.max_json_items) == (10, 20, 30)
     assert Settings().job_limits() == Limits()
@@ -107,7 +105,7 @@ def test_job_limits_are_the_settings() -> None:
         ("bodies", 1),
     ],
 )
-def test_out_of_range_is_refused(name: str, value: object) -> None:
+def test_out_of_range_is_refused(name, value):
     with pytest.raises(ValidationError, match=name):
         Settings(**{name: value})
 
@@ -124,7 +122,7 @@ def test_out_of_range_is_refused(name: str, value: object) -> None:
         *(("hosts", name, f"{name!r} is no host name") for name in ("g:80", "a*.example", "a/b")),
     ],
 )
-def test_what_is_refused_is_told_in_plain_words(name: str, value: str, says: str) -> None:
+def test_what_is_refused_is_told_in_plain_words(name, value, says):
     with pytest.raises(ValidationError) as refused:
         Settings(**{name: value})
     (error,) = refused.value.errors()
@@ -136,9 +134,7 @@ SECONDS = [name for name in Settings.model_fields if name.endswith("_seconds")]
 
 @pytest.mark.parametrize("value", ["inf", "nan", "-inf", "Infinity", "1e999"])
 @pytest.mark.parametrize("name", SECONDS)
-def test_a_time_without_end_is_refused(
-    name: str, value: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_time_without_end_is_refused(name, value, monkeypatch):
     monkeypatch.setenv(f"PNS_{name.upper()}", value)
     with pytest.raises(ValidationError, match=name):
         Settings()
@@ -152,18 +148,14 @@ def test_a_time_without_end_is_refused(
         ("PNS_X", "there is no setting PNS_X"),
     ],
 )
-def test_a_misspelt_setting_is_refused(
-    name: str, text: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_misspelt_setting_is_refused(name, text, monkeypatch):
     monkeypatch.setenv(name, "1")
     with pytest.raises(ValidationError) as refused:
         Settings()
     assert text in str(refused.value)
 
 
-def test_another_programs_variable_passes_where_it_is_said_to(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_another_programs_variable_passes_where_it_is_said_to(monkeypatch):
     monkeypatch.setenv("PNS_FOO", "1")
     with pytest.raises(ValidationError, match="PNS_FOO: unset it, or set PNS_IGNORE_UNKNOWN=1"):
         Settings()
@@ -172,7 +164,7 @@ def test_another_programs_variable_passes_where_it_is_said_to(
 
 
 @pytest.mark.parametrize("name", ["PNS_BODDY", "PNS_JOB_FOO"])
-def test_what_resembles_a_setting_never_passes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_resembles_a_setting_never_passes(name, monkeypatch):
     monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
     monkeypatch.setenv(name, "1")
     with pytest.raises(ValidationError, match=name):

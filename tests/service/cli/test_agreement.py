@@ -1,12 +1,7 @@
 """The command and the service give the same bytes for the same options, for every format."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Iterator
 from dataclasses import fields, replace
-from pathlib import Path
-from typing import Any
 from urllib.parse import urlencode
 
 import numpy as np
@@ -32,7 +27,7 @@ from service.settings import Settings
 from tests.support.gltf.shapes import box
 
 # Each option with a value that is not its default.
-CHOSEN: dict[str, dict[str, Any]] = {
+CHOSEN = {
     "levels": {"levels": 1},
     "scheme": {"scheme": "loop"},
     "budget": {"budget": 0.25},
@@ -56,7 +51,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
 MEDIA = {kind: media for media, kind in FORMATS.items()}
 
 
-def mesh() -> MeshFile:
+def mesh():
     """A box of two materials with normals, which say that its edges are hard, and coordinates."""
     shape = box()
     made = of_triangles(shape["POSITION"].astype(float), shape["indices"])
@@ -72,11 +67,11 @@ def mesh() -> MeshFile:
     return MeshFile(made.vertices, made.offsets, made.corners, layers, labels=labels)
 
 
-def range_of(made: MeshFile) -> Any:
+def range_of(made):
     return (made.corners * 0 + 1).cumsum() - 1
 
 
-def quads() -> MeshFile:
+def quads():
     """The box, its triangles joined in pairs."""
     made = mesh()
     pairs = (np.arange(len(made.corners)).reshape(-1, 6)[:, [0, 1, 2, 5]]).reshape(-1)
@@ -91,7 +86,7 @@ def quads() -> MeshFile:
     )
 
 
-def content(kind: str) -> bytes:
+def content(kind):
     if kind not in ("glb", "gltf"):
         return formats.write(mesh(), kind)
     glb = triangles_glb(mesh())
@@ -99,7 +94,7 @@ def content(kind: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def client() -> Iterator[TestClient]:
+def client():
     with TestClient(create_app(Settings(workers=1)), base_url="http://127.0.0.1") as opened:
         for _ in range(1200):
             if opened.get("/readyz").status_code == 200:
@@ -108,7 +103,7 @@ def client() -> Iterator[TestClient]:
         yield opened
 
 
-def test_every_option_is_tried() -> None:
+def test_every_option_is_tried():
     names = {field.name for field in fields(Options)}
     assert names == set(CHOSEN)
     defaults = Options()
@@ -117,9 +112,7 @@ def test_every_option_is_tried() -> None:
 
 @pytest.mark.spawning
 @pytest.mark.parametrize("kind", [*KINDS, "quads"])
-def test_each_option_gives_the_same_bytes_by_command_and_service(
-    pns: Any, tmp_path: Path, client: TestClient, kind: str
-) -> None:
+def test_each_option_gives_the_same_bytes_by_command_and_service(pns, tmp_path, client, kind):
     data = formats.write(quads(), "obj") if kind == "quads" else content(kind)
     kind = "obj" if kind == "quads" else kind
     source = tmp_path / f"in.{kind}"

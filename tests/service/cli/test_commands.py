@@ -1,15 +1,11 @@
 """Models by name or file, help, settings, keys, and the other options."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal
 import socket
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -32,10 +28,8 @@ from tests.support.networks import default_model_bytes
         ("typer", SystemExit, "typer is missing: pip install"),
     ],
 )
-def test_only_what_others_make_can_be_missing(
-    monkeypatch: pytest.MonkeyPatch, lost: str, error: type[BaseException], text: str
-) -> None:
-    def loses_a_module() -> None:
+def test_only_what_others_make_can_be_missing(monkeypatch, lost, error, text):
+    def loses_a_module():
         raise ModuleNotFoundError("no module", name=lost)
 
     monkeypatch.setattr(cli, "main", loses_a_module)
@@ -44,7 +38,7 @@ def test_only_what_others_make_can_be_missing(
         main()
 
 
-def test_every_command_hears_sigterm_from_its_start() -> None:
+def test_every_command_hears_sigterm_from_its_start():
     """As the first process of a container it has no default, and is killed ten seconds later."""
     # What libraries do around imports that may fail.
     code = """
@@ -64,9 +58,7 @@ __main__.main()
     assert ended.returncode == 128 + signal.SIGTERM
 
 
-def test_a_model_is_a_name_or_a_file_and_the_name_wins(
-    pns: Any, tmp_path: Path, part_file: Path
-) -> None:
+def test_a_model_is_a_name_or_a_file_and_the_name_wins(pns, tmp_path, part_file):
     (tmp_path / "paper").write_bytes(default_model_bytes(0))
     report = tmp_path / "r.json"
     for given, features in (("paper", "paper-5"), ("./paper", "directed-28")):
@@ -82,13 +74,13 @@ def test_a_model_is_a_name_or_a_file_and_the_name_wins(
     assert json.loads(report.read_text())["model"] is None
 
 
-def test_help_says_which_numbers_are_taken(pns: Any) -> None:
+def test_help_says_which_numbers_are_taken(pns):
     said = " ".join(pns("subdivide", "--help").out.replace("│", " ").split())
     for taken in ("1 to 6", "0 to 0.01"):
         assert taken in said
 
 
-def test_help_has_everyday_options_first(pns: Any) -> None:
+def test_help_has_everyday_options_first(pns):
     said = pns("subdivide", "--help").out
     order = ("Everyday", "--output", "--levels", "--crease", "--scheme", "Files", "--to")
     order += ("Research", "--map", "--budget", "--reference-length", "--diagnostics")
@@ -97,7 +89,7 @@ def test_help_has_everyday_options_first(pns: Any) -> None:
     assert places == sorted(places)
 
 
-def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
+def test_info_lists_models_and_shows_a_card(pns):
     listed = pns("info").out.splitlines()
     assert set(bundled_models(companions=True)) <= {line.partition(" ")[0] for line in listed}
     assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
@@ -110,7 +102,7 @@ def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
     assert f"{percent:.4g}" in shown
 
 
-def test_neither_the_commands_nor_their_help_import_torch(tmp_path: Path) -> None:
+def test_neither_the_commands_nor_their_help_import_torch(tmp_path):
     code = (
         "import sys\n"
         "import service.cli, service.http.server\n"
@@ -122,7 +114,7 @@ def test_neither_the_commands_nor_their_help_import_torch(tmp_path: Path) -> Non
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
-def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Path) -> None:
+def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns, tmp_path):
     container = read_glb(part_glb())
     tree = msgspec.json.decode(container.text)
     (tmp_path / "in").mkdir()
@@ -138,7 +130,7 @@ def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Pat
 
 
 @pytest.mark.parametrize("compress", ["draco", "meshopt"])
-def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
+def test_compressed_files_are_written_and_read(pns, part_file, compress):
     assert (
         pns(
             "subdivide", "part.glb", "-o", "packed.glb", "--levels", "1", "--compress", compress
@@ -151,9 +143,7 @@ def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compre
     assert f"{16 * FACES:,} triangles" in done.err
 
 
-def test_a_file_of_keys_that_cannot_be_used_ends_it(
-    pns: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_of_keys_that_cannot_be_used_ends_it(pns, tmp_path, monkeypatch):
     monkeypatch.setenv("PNS_KEYS_FILE", str(tmp_path / "none.toml"))
     code, _, err = pns("serve", "--port", "0")
     assert code == 1
@@ -171,9 +161,7 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
         ({"PNS_HOSTS": "pns.example,a b"}, "PNS_HOSTS: 'a b' is no host name"),
     ],
 )
-def test_a_setting_that_cannot_be_used_ends_it_by_name(
-    pns: Any, monkeypatch: pytest.MonkeyPatch, settings: dict[str, str], said: str
-) -> None:
+def test_a_setting_that_cannot_be_used_ends_it_by_name(pns, monkeypatch, settings, said):
     for name, value in settings.items():
         monkeypatch.setenv(name, value)
     code, _, err = pns("serve", "--port", "0")
@@ -182,7 +170,7 @@ def test_a_setting_that_cannot_be_used_ends_it_by_name(
     assert len(err.splitlines()) == 1
 
 
-def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
+def test_a_port_that_is_taken_ends_it_in_one_line(pns):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         code, out, err = pns("serve", "--port", str(port))
@@ -192,7 +180,7 @@ def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
     assert err.count("\n") == 1
 
 
-def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
+def test_a_host_that_is_none_ends_it_in_one_line(pns):
     code, out, err = pns("serve", "--host", "300.0.0.1", "--port", "0")
     assert (code, out) == (1, "")
     assert "300.0.0.1" in err
@@ -200,9 +188,7 @@ def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
 
 
 @pytest.mark.parametrize("its_own", [False, True])
-def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
-    pns: Any, monkeypatch: pytest.MonkeyPatch, its_own: bool
-) -> None:
+def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(pns, monkeypatch, its_own):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         if its_own:
@@ -215,7 +201,7 @@ def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
 
 
 @pytest.mark.parametrize("budget", [5e6, 1234567.0, 0.1, 1e16])
-def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
+def test_a_key_and_its_entry(pns, tmp_path, budget):
     code, entry, fresh = pns("key", "studio", "--faces-per-minute", f"{budget!r}")
     assert code == 0
     file = tmp_path / "keys.toml"
@@ -226,20 +212,20 @@ def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
     assert fresh.strip() not in entry
 
 
-def test_a_key_of_an_impossible_name_is_refused(pns: Any) -> None:
+def test_a_key_of_an_impossible_name_is_refused(pns):
     code, out, err = pns("key", "Studio")
     assert (code, out) == (1, "")
     assert "a name is 1 to 63 of" in err
 
 
-def test_a_files_name_cannot_speak_to_the_terminal(pns: Any) -> None:
+def test_a_files_name_cannot_speak_to_the_terminal(pns):
     code, _, err = pns("subdivide", "\x1b[31mred\x9b.glb", "-o", "out.glb")
     assert code != 0
     assert "\\x1b[31mred\\x9b.glb" in err
     assert err.replace("\n", "").isprintable()
 
 
-def test_what_a_file_holds_cannot_speak_to_the_terminal(pns: Any, tmp_path: Path) -> None:
+def test_what_a_file_holds_cannot_speak_to_the_terminal(pns, tmp_path):
     tree = tree_of_bytes(part_glb())
     primitive = tree["meshes"][0]["primitives"][0]
     primitive["attributes"]["_\x1b[31mRED"] = primitive["attributes"]["POSITION"]
@@ -252,9 +238,7 @@ def test_what_a_file_holds_cannot_speak_to_the_terminal(pns: Any, tmp_path: Path
 
 
 @pytest.mark.parametrize("more", [[], ["--dry-run"]])
-def test_a_library_s_names_cannot_speak_to_the_terminal(
-    pns: Any, tmp_path: Path, more: list[str]
-) -> None:
+def test_a_library_s_names_cannot_speak_to_the_terminal(pns, tmp_path, more):
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "\x1b[31mred\n.obj").write_text("bad")
     (tmp_path / "in" / "\x1b[31mplain.glb").write_bytes(part_glb())
@@ -264,14 +248,14 @@ def test_a_library_s_names_cannot_speak_to_the_terminal(
     assert err.replace("\n", "").isprintable()
 
 
-def test_an_error_names_the_file_that_it_is_in(pns: Any, tmp_path: Path) -> None:
+def test_an_error_names_the_file_that_it_is_in(pns, tmp_path):
     (tmp_path / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n")
     outcome = pns("subdivide", "bad.obj", "-o", "out.obj")
     assert outcome.code == 1
     assert outcome.err.startswith("pns: bad.obj: line 3 ")
 
 
-def test_the_doctor_finds_this_machine_well(pns: Any) -> None:
+def test_the_doctor_finds_this_machine_well(pns):
     outcome = pns("doctor")
     assert outcome.code == 0, outcome.out
     lines = outcome.out.splitlines()
@@ -279,9 +263,7 @@ def test_the_doctor_finds_this_machine_well(pns: Any) -> None:
     assert {"pns", "numpy", "kernels", "models", "self-test"} <= {line.split()[1] for line in lines}
 
 
-def test_the_doctor_goes_on_after_what_is_wrong_and_ends_with_1(
-    pns: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_doctor_goes_on_after_what_is_wrong_and_ends_with_1(pns, monkeypatch):
     monkeypatch.setenv("PNS_FOO", "1")
     outcome = pns("doctor")
     assert outcome.code == 1

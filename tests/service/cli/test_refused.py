@@ -1,10 +1,6 @@
 """A refusal is one line and an exit code, and leaves everything as it was."""
 
-from __future__ import annotations
-
 import stat
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -50,9 +46,7 @@ NAMES = ", ".join(bundled_models(companions=True))
         ("subdivide part.glb", 2, "--output"),
     ],
 )
-def test_errors_are_one_line_and_leave_no_file(
-    pns: Any, tmp_path: Path, part_file: Path, arguments: str, code: int, says: str
-) -> None:
+def test_errors_are_one_line_and_leave_no_file(pns, tmp_path, part_file, arguments, code, says):
     (tmp_path / "broken.glb").write_bytes(b"no")
     (tmp_path / "broken.ply").write_bytes(b"no")
     tree = tree_of_bytes(part_glb())
@@ -70,16 +64,14 @@ def test_errors_are_one_line_and_leave_no_file(
     assert set(tmp_path.iterdir()) == before
 
 
-def test_a_failure_keeps_the_file_that_was_there(pns: Any, tmp_path: Path) -> None:
+def test_a_failure_keeps_the_file_that_was_there(pns, tmp_path):
     (tmp_path / "out.glb").write_text("precious")
     (tmp_path / "broken.glb").write_bytes(b"no")
     assert pns("subdivide", "broken.glb", "-o", "out.glb").code == 1
     assert (tmp_path / "out.glb").read_text() == "precious"
 
 
-def test_output_has_the_permissions_of_any_new_file(
-    pns: Any, tmp_path: Path, part_file: Path
-) -> None:
+def test_output_has_the_permissions_of_any_new_file(pns, tmp_path, part_file):
     pns("subdivide", str(part_file), "-o", "out.glb")
     (tmp_path / "plain").touch()
     modes = {stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("out.glb", "plain")}
@@ -90,9 +82,7 @@ def test_output_has_the_permissions_of_any_new_file(
     ("output", "report"),
     [("same.glb", "same.glb"), ("same.glb", "sub/../same.glb"), ("out.glb", "part.glb")],
 )
-def test_a_report_never_replaces_a_model(
-    pns: Any, tmp_path: Path, part_file: Path, output: str, report: str
-) -> None:
+def test_a_report_never_replaces_a_model(pns, tmp_path, part_file, output, report):
     (tmp_path / "sub").mkdir()
     outcome = pns("subdivide", "part.glb", "-o", output, "--report", report)
     assert outcome.code == 2
@@ -101,9 +91,7 @@ def test_a_report_never_replaces_a_model(
     assert not (tmp_path / "same.glb").exists()
 
 
-def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
-    pns: Any, part_file: Path
-) -> None:
+def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(pns, part_file):
     outcome = pns("subdivide", "part.glb", "-o", "nowhere/out.glb")
     assert outcome.err == "pns: nowhere/out.glb: there is no folder nowhere\n"
     outcome = pns("example", "nowhere/out.glb")
@@ -113,17 +101,15 @@ def test_a_missing_folder_is_named_with_the_file_that_was_asked_for(
 @pytest.mark.parametrize(
     ("setting", "value"), [("PNS_FACES", "1000"), ("PNS_MEMORY", "1MiB"), ("PNS_JSON_ITEMS", "9")]
 )
-def test_a_limit_names_the_setting_that_raises_it(
-    pns: Any, part_file: Path, monkeypatch: pytest.MonkeyPatch, setting: str, value: str
-) -> None:
+def test_a_limit_names_the_setting_that_raises_it(pns, part_file, monkeypatch, setting, value):
     monkeypatch.setenv(setting, value)
     outcome = pns("subdivide", "part.glb", "-o", "out.glb")
     assert outcome.code == 1
     assert f"{setting} allows more" in outcome.err
 
 
-def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fault() -> None:
+def test_a_fault_of_ours_is_a_traceback(pns, monkeypatch):
+    def fault():
         raise ZeroDivisionError("ours")
 
     monkeypatch.setattr(commands, "app", fault)
@@ -131,5 +117,5 @@ def test_a_fault_of_ours_is_a_traceback(pns: Any, monkeypatch: pytest.MonkeyPatc
         cli.main()
 
 
-def test_an_error_of_the_system_without_a_number_is_told_in_its_own_words() -> None:
+def test_an_error_of_the_system_without_a_number_is_told_in_its_own_words():
     assert explained(OSError("the stream is closed")) == ("output: the stream is closed", 1)

@@ -1,14 +1,10 @@
 """Promises over real connections: slow and vanishing clients, a server that stays awake."""
 
-from __future__ import annotations
-
 import socket
 import struct
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-import httpx2
 import pytest
 
 from tests.support.live import received, request_head, served, until
@@ -19,24 +15,22 @@ CUT_OFF = "an answer is cut off: its client is too slow"
 
 
 @pytest.fixture(scope="module")
-def address() -> Iterator[tuple[str, int]]:
+def address():
     with served(
         workers=2, queue=4, body=64 * MIB, upload_seconds=3, stall_seconds=1, job_seconds=3600
     ) as where:
         yield where
 
 
-def subdivide(client: httpx2.Client, body: bytes) -> httpx2.Response:
+def subdivide(client, body):
     return client.post("/subdivide", content=body)
 
 
-def head_of(length: int, *more: str) -> bytes:
+def head_of(length, *more):
     return request_head(f"Content-Length: {length}", *more)
 
 
-def test_healthz_answers_while_a_job_holds_its_interpreter(
-    address: tuple[str, int], client: httpx2.Client
-) -> None:
+def test_healthz_answers_while_a_job_holds_its_interpreter(address, client):
     with socket.create_connection(address) as job:
         job.sendall(head_of(4) + b"hold")
         # A probe that waited for the job would never come back.
@@ -47,7 +41,7 @@ def test_healthz_answers_while_a_job_holds_its_interpreter(
     # Leaving has killed its worker.
 
 
-def test_healthz_answers_while_a_large_body_is_taken_in(client: httpx2.Client) -> None:
+def test_healthz_answers_while_a_large_body_is_taken_in(client):
     with ThreadPoolExecutor(1) as other:
         job = other.submit(subdivide, client, b"{}," * (16 * MIB // 3))
         probes = 0
@@ -58,9 +52,7 @@ def test_healthz_answers_while_a_large_body_is_taken_in(client: httpx2.Client) -
     assert probes > 5
 
 
-def test_a_client_that_leaves_during_its_upload_is_forgotten(
-    address: tuple[str, int], client: httpx2.Client
-) -> None:
+def test_a_client_that_leaves_during_its_upload_is_forgotten(address, client):
     for _ in range(6):
         with socket.create_connection(address) as connection:
             connection.sendall(head_of(100, "Expect: 100-continue"))
@@ -73,7 +65,7 @@ def test_a_client_that_leaves_during_its_upload_is_forgotten(
 @pytest.mark.parametrize(
     "limits", [{"idle_seconds": 1, "upload_seconds": 60}, {"idle_seconds": 60, "upload_seconds": 2}]
 )
-def test_408_for_an_upload_that_stops_or_takes_too_long(limits: dict[str, float]) -> None:
+def test_408_for_an_upload_that_stops_or_takes_too_long(limits):
     with served(workers=1, **limits) as where, socket.create_connection(where) as connection:
         connection.sendall(head_of(100))
         for _ in range(4):
@@ -85,22 +77,20 @@ def test_408_for_an_upload_that_stops_or_takes_too_long(limits: dict[str, float]
     assert b"upload-timeout" in answer
 
 
-def test_413_is_answered_before_the_body_is_sent(address: tuple[str, int]) -> None:
+def test_413_is_answered_before_the_body_is_sent(address):
     with socket.create_connection(address) as connection:
         connection.sendall(head_of(10**12, "Expect: 100-continue"))
         answer = connection.recv(4096)
     assert answer.startswith(b"HTTP/1.1 413 ")
 
 
-def test_an_answer_larger_than_any_buffer_arrives_whole(client: httpx2.Client) -> None:
+def test_an_answer_larger_than_any_buffer_arrives_whole(client):
     answer = subdivide(client, f"large {48 * MIB}".encode().ljust(100))
     assert answer.headers["content-length"] == str(48 * MIB)
     assert len(answer.content) == 48 * MIB
 
 
-def test_a_client_that_does_not_read_is_cut_off(
-    address: tuple[str, int], client: httpx2.Client, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_client_that_does_not_read_is_cut_off(address, client, caplog):
     body = f"large {48 * MIB}".encode().ljust(100)
     with socket.create_connection(address) as connection:
         connection.sendall(head_of(len(body)) + body)
@@ -110,9 +100,7 @@ def test_a_client_that_does_not_read_is_cut_off(
     assert subdivide(client, b"here").content == b"here"
 
 
-def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(
-    address: tuple[str, int], client: httpx2.Client, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_clients_that_reset_their_connections_leave_no_fault_in_the_log(address, client, caplog):
     large = f"large {48 * MIB}".encode().ljust(100)
     for sent, answered in (
         (b"GET /healthz HTT", 0),

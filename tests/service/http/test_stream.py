@@ -1,16 +1,10 @@
 """The stream: how far a job is, then the file and the report, or why there is none."""
 
-from __future__ import annotations
-
 import json
 import socket
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from email import message_from_bytes
-from email.message import Message
-from pathlib import Path
 
-import httpx2
 import pytest
 
 from service.http import answer as answers
@@ -21,12 +15,12 @@ STREAM = {"Accept": MIXED}
 
 
 @pytest.fixture(scope="module")
-def address() -> Iterator[tuple[str, int]]:
+def address():
     with served(workers=2, queue=2, client_requests=3, job_seconds=3600) as where:
         yield where
 
 
-def parts_of(answer: httpx2.Response) -> list[Message]:
+def parts_of(answer):
     """The parts, as Python's own reader of MIME finds them."""
     assert answer.status_code == 200
     head = f"Content-Type: {answer.headers['content-type']}\r\n\r\n".encode()
@@ -36,7 +30,7 @@ def parts_of(answer: httpx2.Response) -> list[Message]:
     return message.get_payload()  # pyright: ignore
 
 
-def named(parts: list[Message], name: str) -> list[bytes]:
+def named(parts, name):
     return [
         part.get_payload(decode=True)  # pyright: ignore
         for part in parts
@@ -44,24 +38,24 @@ def named(parts: list[Message], name: str) -> list[bytes]:
     ]
 
 
-def views_of(answer: httpx2.Response) -> Iterator[dict[str, object]]:
+def views_of(answer):
     """The progress of the job, as it is told."""
     return (json.loads(line) for line in answer.iter_lines() if line.startswith("{"))
 
 
-def begin(address: tuple[str, int], body: bytes, accept: str = MIXED) -> socket.socket:
+def begin(address, body, accept=MIXED):
     connection = socket.create_connection(address, timeout=600)
     head = request_head(f"Accept: {accept}", f"Content-Length: {len(body)}")
     connection.sendall(head + body)
     return connection
 
 
-def let_go(folder: Path) -> None:
+def let_go(folder):
     for number in (1, 2, 3):
         (folder / f"go-{number}").touch()
 
 
-def test_the_file_and_the_report_come_last(client: httpx2.Client) -> None:
+def test_the_file_and_the_report_come_last(client):
     parts = parts_of(client.post("/subdivide", content=b"echo", headers=STREAM))
     *progress, file, report = parts
     assert {part["Content-Description"] for part in progress} == {"progress"}
@@ -71,7 +65,7 @@ def test_the_file_and_the_report_come_last(client: httpx2.Client) -> None:
     assert "refine;dur=2.0" in file["Server-Timing"]
 
 
-def test_a_job_that_fails_ends_with_its_problem(client: httpx2.Client) -> None:
+def test_a_job_that_fails_ends_with_its_problem(client):
     headers = STREAM | {"X-Request-ID": "mine"}
     for body, status, code in (
         (b"broken", 422, "invalid-gltf"),
@@ -86,14 +80,14 @@ def test_a_job_that_fails_ends_with_its_problem(client: httpx2.Client) -> None:
         assert b"secret" not in named(parts, "problem")[0]
 
 
-def test_what_is_refused_before_its_job_is_no_stream(client: httpx2.Client) -> None:
+def test_what_is_refused_before_its_job_is_no_stream(client):
     answer = client.post("/subdivide?levels=9", content=b"echo", headers=STREAM)
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-def test_its_share_and_stage_are_told_as_it_goes_on(client: httpx2.Client, tmp_path: Path) -> None:
-    seen: list[dict[str, object]] = []
+def test_its_share_and_stage_are_told_as_it_goes_on(client, tmp_path):
+    seen = []
     body = f"steps {tmp_path}".encode()
     with client.stream("POST", "/subdivide", content=body, headers=STREAM) as answer:
         for view in views_of(answer):
@@ -103,9 +97,7 @@ def test_its_share_and_stage_are_told_as_it_goes_on(client: httpx2.Client, tmp_p
     assert seen[-1] == {"state": "running", "place": None, "stage": "refine", "share": 0.75}
 
 
-def test_a_stream_is_never_silent_for_long(
-    client: httpx2.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stream_is_never_silent_for_long(client, tmp_path, monkeypatch):
     """A proxy ends a connection on which nothing moves."""
     monkeypatch.setattr(answers, "LOOK_SECONDS", 0.02)
     monkeypatch.setattr(answers, "SILENT_SECONDS", 0.1)
@@ -119,9 +111,7 @@ def test_a_stream_is_never_silent_for_long(
     assert same >= 3
 
 
-def test_one_that_waits_is_told_its_place(
-    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
-) -> None:
+def test_one_that_waits_is_told_its_place(address, client, tmp_path):
     """One client runs one job where there are two workers."""
     with begin(address, f"steps {tmp_path}".encode()):
         until((tmp_path / "took-1").exists)
@@ -131,9 +121,7 @@ def test_one_that_waits_is_told_its_place(
             let_go(tmp_path)
 
 
-def test_429_for_more_than_a_client_may_have(
-    address: tuple[str, int], client: httpx2.Client, tmp_path: Path
-) -> None:
+def test_429_for_more_than_a_client_may_have(address, client, tmp_path):
     held = [begin(address, f"steps {tmp_path}".encode()) for _ in range(3)]
     until((tmp_path / "took-1").exists)
     until(lambda: client.post("/subdivide", content=b"x").status_code == 429)
@@ -147,9 +135,7 @@ def test_429_for_more_than_a_client_may_have(
 
 @pytest.mark.parametrize("accept", [MIXED, "*/*"])
 @pytest.mark.parametrize("word", ["steps", "hold"])
-def test_who_leaves_frees_its_worker_and_memory(
-    address: tuple[str, int], client: httpx2.Client, tmp_path: Path, word: str, accept: str
-) -> None:
+def test_who_leaves_frees_its_worker_and_memory(address, client, tmp_path, word, accept):
     """Also where its job does not look; a job may take an hour here."""
     for number in range(3):
         folder = tmp_path / str(number)
@@ -160,9 +146,7 @@ def test_who_leaves_frees_its_worker_and_memory(
     until(lambda: client.post("/subdivide", content=b"here").content == b"here")
 
 
-def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_service_that_ends_leaves_a_stream_without_its_last_boundary(tmp_path, caplog):
     """That is how a client knows that nothing more comes."""
     with ThreadPoolExecutor(1) as reader, served(workers=1, drain_seconds=1) as where:
         connection = begin(where, f"steps {tmp_path}".encode())

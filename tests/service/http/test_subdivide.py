@@ -1,19 +1,13 @@
 """The whole service on real files: workers, pipeline and bundled model together."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import zipfile
-from collections.abc import Iterator
-from typing import Any
 
-import httpx2
 import msgspec
 import pytest
-from fastapi.testclient import TestClient
 
-from service.bodies.media import MEDIA_TYPES, Kind
+from service.bodies.media import MEDIA_TYPES
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
 from service.meshfiles import formats
@@ -31,27 +25,27 @@ FACES = 1920
 
 
 @pytest.fixture(scope="module")
-def client() -> Iterator[TestClient]:
+def client():
     with local(create_app(Settings(workers=1, faces=100_000))) as opened:
         until(lambda: opened.get("/readyz").status_code == 200)
         yield opened
 
 
 @pytest.fixture(scope="module")
-def part() -> bytes:
+def part():
     return part_glb()
 
 
-def tree_of(glb: bytes) -> dict[str, Any]:
+def tree_of(glb):
     return msgspec.json.decode(read_glb(glb).text)
 
 
-def report_of(answer: httpx2.Response) -> dict[str, Any]:
+def report_of(answer):
     assert answer.status_code == 200, answer.text
     return tree_of(answer.content)["asset"]["extras"]["pns"]
 
 
-def test_a_body_in_gzip_is_refined_as_it_was_before(client: TestClient, part: bytes) -> None:
+def test_a_body_in_gzip_is_refined_as_it_was_before(client, part):
     plain = client.post("/subdivide", content=part, headers=GLB)
     packed = client.post(
         "/subdivide", content=gzip.compress(part), headers=GLB | {"Content-Encoding": "gzip"}
@@ -60,7 +54,7 @@ def test_a_body_in_gzip_is_refined_as_it_was_before(client: TestClient, part: by
     assert packed.content == plain.content
 
 
-def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: bytes) -> None:
+def test_a_raw_glb_is_refined_and_carries_its_report(client, part):
     answer = client.post("/subdivide?levels=2", content=part, headers=GLB)
     assert answer.headers["content-type"] == "model/gltf-binary"
     report = report_of(answer)
@@ -71,7 +65,7 @@ def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: b
     assert "refine;dur=" in answer.headers["server-timing"]
 
 
-def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part: bytes) -> None:
+def test_every_way_to_send_a_file_gives_the_same_answer(client, part):
     raw = client.post("/subdivide", content=part, headers=GLB)
     for kind in ("application/octet-stream", "model/gltf-binary"):
         form = client.post("/subdivide", files={"file": ("part.glb", part, kind)})
@@ -85,9 +79,7 @@ def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part
     assert report_of(as_json)["levels"] == report_of(raw)["levels"]
 
 
-def test_files_beside_the_document_come_as_parts_or_in_an_archive(
-    client: TestClient, part: bytes
-) -> None:
+def test_files_beside_the_document_come_as_parts_or_in_an_archive(client, part):
     container = read_glb(part)
     tree = msgspec.json.decode(container.text)
     tree["buffers"][0]["uri"] = "data/part%201.bin"
@@ -111,14 +103,14 @@ def test_files_beside_the_document_come_as_parts_or_in_an_archive(
     assert missing.json()["pointer"] == "/buffers/0/uri"
 
 
-def test_accept_json_gives_the_same_report_alone(client: TestClient, part: bytes) -> None:
+def test_accept_json_gives_the_same_report_alone(client, part):
     whole = client.post("/subdivide", content=part, headers=GLB)
     alone = client.post("/subdivide", content=part, headers=GLB | {"Accept": "application/json"})
     assert alone.headers["content-type"] == "application/json"
     assert alone.json() == report_of(whole)
 
 
-def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
+def test_parameters_reach_the_operator(client, part):
     query = "/subdivide?scheme=pns&budget=0.25&reference_length=2.5&diagnostics=full"
     answer = client.post(query, content=part, headers=GLB)
     report = report_of(answer)
@@ -133,9 +125,7 @@ def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
 
 
 @pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off", "3mf"])
-def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
-    client: TestClient, part: bytes, kind: str
-) -> None:
+def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(client, part, kind):
     triangles = example_part()
     content = formats.write(triangles, kind)
     raw = client.post("/subdivide", content=content, headers={"Content-Type": f"model/{kind}"})
@@ -148,7 +138,7 @@ def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
     assert mean_ratio == pytest.approx(direct["levels"][0]["proximity_ratio"]["mean"], rel=1e-3)
 
 
-def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
+def test_what_a_conversion_loses_is_in_the_report(client):
     text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\ng red\nf 1 2 3 4\n"
     files = {"file": ("quad.obj", text), "quad.mtl": ("quad.mtl", b"newmtl red\n")}
     report = report_of(client.post("/subdivide", files=files))
@@ -160,7 +150,7 @@ def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
     assert report["totals"]["faces"] == 16
 
 
-def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> None:
+def test_a_model_given_to_the_application_is_the_one_that_runs(part):
     """And it crosses to each worker once."""
     before = CountedModel.pickled
     app = create_app(Settings(workers=1), model=CountedModel(), warm_up=hold_model)
@@ -172,7 +162,7 @@ def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> N
     assert CountedModel.pickled == before + 1
 
 
-def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
+def test_what_an_upload_says_is_not_logged(capfd):
     kind = {"Content-Type": "multipart/form-data; boundary=b"}
     # Its worker starts here, so that it writes to the stream that is captured.
     with local(create_app(Settings(workers=1), warm_up=hold_model)) as client:
@@ -181,7 +171,7 @@ def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) ->
     assert "header" not in capfd.readouterr().err
 
 
-def test_without_a_model_loop_still_works(part: bytes) -> None:
+def test_without_a_model_loop_still_works(part):
     settings = Settings(workers=1, model="missing.onnx")
     with local(create_app(settings, warm_up=hold_model)) as client:
         refused = client.post("/subdivide", content=part, headers=GLB)
@@ -192,9 +182,7 @@ def test_without_a_model_loop_still_works(part: bytes) -> None:
 
 
 @pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off", "3mf"])
-def test_an_answer_in_another_format_is_what_the_command_writes(
-    client: TestClient, target: Kind
-) -> None:
+def test_an_answer_in_another_format_is_what_the_command_writes(client, target):
     query = f"levels=1&scheme=loop&format={target}"
     answer = client.post(f"/subdivide?{query}", content=part_glb(), headers=GLB)
     written = converted(part_glb(), "glb", target, Options(levels=1, scheme="loop"), None, Limits())

@@ -1,9 +1,6 @@
 """Files as they occur: the shared collection, and each of its kinds made here."""
 
-from __future__ import annotations
-
 import struct
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +9,8 @@ from service.bodies.sibling_files import ALONE, folder_of
 from service.errors import UnrefinableError
 from service.gltf.read.container import read_glb
 from service.meshfiles import formats
-from service.meshfiles.convert import Written, converted
-from service.meshfiles.mesh_file import COLOUR, MATERIAL, MeshFile
+from service.meshfiles.convert import converted
+from service.meshfiles.mesh_file import COLOUR, MATERIAL
 from service.options import Limits, Options
 from tests.support.gltf import files
 from tests.support.gltf.flattened import flatten
@@ -35,7 +32,7 @@ PLY_FACES = "".join("3 {} {} {}\n".format(*triangle) for triangle in TRIANGLES)
 PLY_POINTS = "".join("{} {} {}\n".format(*corner) for corner in CORNERS)
 
 
-def stl_text() -> str:
+def stl_text():
     facets = (
         "facet normal 0 0 0\nouter loop\n"
         + "".join("vertex {} {} {}\n".format(*CORNERS[corner]) for corner in triangle)
@@ -45,13 +42,13 @@ def stl_text() -> str:
     return "solid part\n" + "".join(facets)
 
 
-def stl_binary(head: bytes = b"", count: int = 12, order: str = "<") -> bytes:
+def stl_binary(head=b"", count=12, order="<"):
     corners = np.array(CORNERS, dtype=f"{order}f4")[np.array(TRIANGLES)]
     facets = b"".join(bytes(12) + three.tobytes() + bytes(2) for three in corners)
     return head.ljust(80, b"\0") + struct.pack(f"{order}I", count) + facets
 
 
-def strips() -> bytes:
+def strips():
     head = PLY_HEAD.format("", "").replace("ascii", "binary_little_endian")
     head = head.replace("element face 12", "element tristrips 1").replace("uchar", "int")
     # Of two triangles each: the diagonal is the other one.
@@ -60,11 +57,11 @@ def strips() -> bytes:
     return head.encode() + points + struct.pack(f"<{1 + len(runs)}i", len(runs), *runs)
 
 
-def ply(beside: str = "", behind: str = "", points: str = PLY_POINTS, tail: str = "") -> bytes:
+def ply(beside="", behind="", points=PLY_POINTS, tail=""):
     return (PLY_HEAD.format(beside, behind) + points + PLY_FACES + tail).encode()
 
 
-CUBES: dict[str, tuple[str, bytes]] = {
+CUBES = {
     "obj: the old name of f": ("obj", (OBJ + OBJ_FACES.replace("f ", "fo ")).encode()),
     "obj: normals that are no numbers": ("obj", (OBJ + "vn 0 0 1,\n" + OBJ_FACES).encode()),
     "obj: a statement nobody knows": ("obj", (OBJ + "shadow_obj a\n\n" + OBJ_FACES).encode()),
@@ -134,7 +131,7 @@ CUBES: dict[str, tuple[str, bytes]] = {
 }
 
 
-def refined(data: bytes, kind: str, target: str, **options: Any) -> Written:
+def refined(data, kind, target, **options):
     return converted(
         data,
         kind,
@@ -147,12 +144,12 @@ def refined(data: bytes, kind: str, target: str, **options: Any) -> Written:
     )
 
 
-def area(mesh: MeshFile) -> float:
+def area(mesh):
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def is_closed(mesh: MeshFile) -> bool:
+def is_closed(mesh):
     _, vertex = np.unique(mesh.vertices, axis=0, return_inverse=True)
     faces = vertex.reshape(-1)[mesh.faces]
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -161,7 +158,7 @@ def is_closed(mesh: MeshFile) -> bool:
 
 
 @pytest.mark.parametrize("name", CUBES)
-def test_a_cube_is_read_however_it_is_written(name: str) -> None:
+def test_a_cube_is_read_however_it_is_written(name):
     kind, data = CUBES[name]
     mesh = formats.read(data, kind)
     assert len(mesh.faces) == 12
@@ -192,7 +189,7 @@ def test_a_cube_is_read_however_it_is_written(name: str) -> None:
         "stl_binary_solid_header_crlf_tail.stl",
     ],
 )
-def test_the_collections_cubes_are_whole(name: str) -> None:
+def test_the_collections_cubes_are_whole(name):
     path = shared_path("cases") / name
     data, kind = path.read_bytes(), path.suffix[1:]
     mesh = formats.read(data, kind)
@@ -211,7 +208,7 @@ def test_the_collections_cubes_are_whole(name: str) -> None:
         )
 
 
-def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb() -> None:
+def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb():
     folder = shared_path("cases")
     ours = refined(
         (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", crease="normals"
@@ -228,7 +225,7 @@ def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb() -> None:
     assert "NORMAL" in primitive["attributes"]
 
 
-def test_the_collections_glbs_are_read_whole() -> None:
+def test_the_collections_glbs_are_read_whole():
     folder = shared_path("cases")
     tail = refined((folder / "glb_one_trailing_byte.glb").read_bytes(), "glb", "glb").report
     assert {"pointer": "", "what": "bytes behind the GLB left out", "count": 1} in tail["changes"]
@@ -258,7 +255,7 @@ COLOURED = {
 
 @pytest.mark.parametrize("target", ["obj", "ply", "off", "glb"])
 @pytest.mark.parametrize("kind", COLOURED)
-def test_vertex_colours_are_kept_and_blended_linearly(kind: str, target: str) -> None:
+def test_vertex_colours_are_kept_and_blended_linearly(kind, target):
     made = refined(COLOURED[kind].encode(), kind, target).content
     if target == "glb":
         tree, binary = files.unpack(made)
@@ -280,7 +277,7 @@ def test_vertex_colours_are_kept_and_blended_linearly(kind: str, target: str) ->
     np.testing.assert_allclose(found, sorted(ends + middles), atol=0.01)
 
 
-def test_colours_up_to_255_are_fractions_of_it() -> None:
+def test_colours_up_to_255_are_fractions_of_it():
     float_ply = (
         COLOURED["ply"].replace("uchar red", "float red").replace("uchar green", "float green")
     )
@@ -306,7 +303,7 @@ def test_colours_up_to_255_are_fractions_of_it() -> None:
     ]
 
 
-def test_colours_of_faces_stay_with_the_faces_made_of_them() -> None:
+def test_colours_of_faces_stay_with_the_faces_made_of_them():
     text = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n"
     for target in ("off", "ply"):
         mesh = formats.read(refined(text.encode(), "off", target).content, target)
@@ -314,7 +311,7 @@ def test_colours_of_faces_stay_with_the_faces_made_of_them() -> None:
         assert colours.tolist() == 4 * [[255, 0, 0]] + 4 * [[0, 0, 255]]
 
 
-def test_colours_of_faces_below_those_of_vertices_are_reported() -> None:
+def test_colours_of_faces_below_those_of_vertices_are_reported():
     colour = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     points, faces = PLY_POINTS.replace("\n", " 255 0 0 .5\n"), PLY_FACES.replace("\n", " 0 0 255\n")
     head = PLY_HEAD.format(f"{colour}property float alpha\n", colour)
@@ -326,7 +323,7 @@ def test_colours_of_faces_below_those_of_vertices_are_reported() -> None:
     assert any("colours of faces" in change["what"] for change in made.report["changes"])
 
 
-def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
+def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it():
     shape = box()
     flat = shape["indices"].reshape(-1)
     noise = 1e-7 * np.random.default_rng(0).standard_normal((len(flat), 3))
@@ -343,7 +340,7 @@ def test_a_seam_that_is_nearly_closed_is_reported_with_what_closes_it() -> None:
 
 @pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "glb"])
 @pytest.mark.parametrize("levels", [1, 2])
-def test_one_material_is_refined_and_its_neighbours_meet_it(target: str, levels: int) -> None:
+def test_one_material_is_refined_and_its_neighbours_meet_it(target, levels):
     data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
     whole = formats.read(data, "obj")
     for name in whole.labels[MATERIAL].names:
@@ -372,9 +369,7 @@ def test_one_material_is_refined_and_its_neighbours_meet_it(target: str, levels:
         ("D2/D2_windows_path.obj", {"embedded"}, {"TEXCOORD_0"}),
     ],
 )
-def test_files_of_the_fourth_collection_come_whole(
-    name: str, told: set[str], layers: set[str]
-) -> None:
+def test_files_of_the_fourth_collection_come_whole(name, told, layers):
     path = shared_path("cases") / "4" / name
     kind = path.suffix[1:]
     options = Options(scheme="loop", levels=1)

@@ -15,17 +15,17 @@ from service.workers import jobs, worker
 class Thing:
     """Holds itself, so that no count of references ends it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.own = self
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_what_a_job_leaves_in_cycles_is_gone_after_it(fails: bool) -> None:
-    left: list[weakref.ref[Thing]] = []
-    rare: list[tuple[int, int, int]] = []
+def test_what_a_job_leaves_in_cycles_is_gone_after_it(fails):
+    left = []
+    rare = []
     usual = gc.get_threshold()
 
-    def job() -> None:
+    def job():
         left.append(weakref.ref(Thing()))
         rare.append(gc.get_threshold())
         if fails:
@@ -46,11 +46,11 @@ class Held:
 
 
 @pytest.mark.parametrize("kind", [GltfError, ZeroDivisionError])
-def test_a_refusal_holds_nothing_of_its_job(kind: type[Exception]) -> None:
+def test_a_refusal_holds_nothing_of_its_job(kind):
     """The error is kept until it is sent, and with its frames would keep what they hold."""
-    left: list[weakref.ref[Held]] = []
+    left = []
 
-    def job() -> None:
+    def job():
         held = Held()
         left.append(weakref.ref(held))
         try:
@@ -65,9 +65,7 @@ def test_a_refusal_holds_nothing_of_its_job(kind: type[Exception]) -> None:
 
 
 @pytest.mark.parametrize("face", [b"f 1 2 3", b"f 1 2 3 4"])
-def test_a_warm_worker_opens_no_network_in_its_first_job(
-    face: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_warm_worker_opens_no_network_in_its_first_job(face, monkeypatch):
     """It would be kept from then on: a worker would seem to grow."""
     jobs.warm_up(None)
     monkeypatch.setattr(session, "_open_session", None)

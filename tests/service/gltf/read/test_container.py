@@ -1,4 +1,4 @@
-"""The GLB container and its JSON: exact bounds in, exact bytes out, counted before they are made."""
+"""The GLB container and its JSON: exact bounds in, exact bytes out, nothing made uncounted."""
 
 import pytest
 
