@@ -8,9 +8,9 @@ from service.workers import pool
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import served
 
-ANSWERS = 2_000
+ANSWERS = 1_000
 # Each costs a worker's life, and the start of its successor.
-DISCONNECTS = 48
+DISCONNECTS = 32
 HONEST = 32
 RUDE = 8
 

@@ -20,7 +20,6 @@ from tests.support.networks import DEFAULT_CARD
 from tests.support.packages import served_file, several_models
 from tests.support.stand_in_models import ZeroModel
 
-REPORT = "/report?diagnostics=none"
 NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
 
 
@@ -39,24 +38,24 @@ def client(folder):
         yield opened
 
 
-def subdivide(client, query):
-    return client.post(f"{REPORT}&{query}", content=part_glb(), headers=GLB)
+def asked(client, query):
+    return client.post(f"/report?diagnostics=none&{query}", content=part_glb(), headers=GLB)
 
 
 def report(client, query):
-    answer = subdivide(client, query)
+    answer = asked(client, query)
     assert answer.status_code == 200, answer.text
     return answer.json()
 
 
-def test_a_request_picks_its_model_by_name(client):
-    paper = report(client, "model=paper")
+def test_a_request_picks_its_model_by_name(client, caplog):
+    with caplog.at_level("INFO", logger="pns.service"):
+        paper, both = report(client, "model=paper"), report(client, "model=vertices")
     assert (paper["model"], paper["model_hash"]) == ("paper", load_model("paper").hash)
     assert paper["budget"] == load_model("paper").card.budget
-    both = report(client, "model=vertices")
-    assert both["model"] == "vertices"
-    assert both["budget"] == DEFAULT_CARD.budget
+    assert (both["model"], both["budget"]) == ("vertices", DEFAULT_CARD.budget)
     assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
+    assert "auto (vertices) levels=2" in caplog.text
     assert report(client, "")["model"] == DEFAULT_MODEL
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")
 
@@ -64,16 +63,18 @@ def test_a_request_picks_its_model_by_name(client):
 @pytest.mark.parametrize("name", ["pape", "Paper", "./paper", "paper.onnx", "/etc/passwd", "../x"])
 @pytest.mark.parametrize("scheme", ["pns", "loop"])
 def test_422_for_what_is_no_models_name(client, name, scheme):
-    answer = subdivide(client, f"model={name}&scheme={scheme}")
-    assert answer.status_code == 422
+    answer = asked(client, f"model={name}&scheme={scheme}")
     document = answer.json()
+    assert answer.status_code == 422
     assert (document["code"], document["parameter"]) == ("invalid-parameter", "model")
     assert document["choices"] == NAMES
     assert all(known in document["detail"] for known in NAMES)
 
 
-def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client):
-    plain = report(client, "scheme=loop")
+def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client, caplog):
+    with caplog.at_level("INFO", logger="pns.service"):
+        plain = report(client, "scheme=loop")
+    assert "loop levels=2" in caplog.text
     assert report(client, "scheme=loop&model=vertices&budget=0.5") == plain
     assert plain["model"] is plain["budget"] is None
     # Not even loaded.
@@ -81,9 +82,8 @@ def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client):
 
 
 def test_503_for_a_bundled_model_that_does_not_load_and_for_it_alone(client):
-    answer = subdivide(client, "model=broken")
-    assert answer.status_code == 503
-    assert answer.json()["code"] == "no-model"
+    answer = asked(client, "model=broken")
+    assert (answer.status_code, answer.json()["code"]) == (503, "no-model")
     assert "broken" in answer.json()["detail"]
     assert report(client, "model=paper")["model"] == "paper"
     assert client.get("/readyz").status_code == 200
@@ -91,7 +91,6 @@ def test_503_for_a_bundled_model_that_does_not_load_and_for_it_alone(client):
 
 def test_models_are_listed_with_what_their_files_say(client, folder):
     answer = client.get("/models")
-    assert answer.status_code == 200
     assert answer.headers["content-type"] == "application/json"
     entries = {entry["name"]: entry for entry in answer.json()}
     # One that does not load has nothing to say of itself.
@@ -112,17 +111,8 @@ def test_the_list_is_kept_by_clients_and_asked_for_again_at_no_cost(client):
     assert answer.headers["cache-control"] == "no-cache"
     assert client.get("/models").content == answer.content
     again = client.get("/models", headers={"If-None-Match": tag})
-    assert (again.status_code, again.content) == (304, b"")
-    assert again.headers["etag"] == tag
+    assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
     assert client.get("/models", headers={"If-None-Match": '"other"'}).status_code == 200
-
-
-def test_the_log_names_the_model(client, caplog):
-    with caplog.at_level("INFO", logger="pns.service"):
-        report(client, "model=vertices")
-        report(client, "scheme=loop")
-    assert "auto (vertices) levels=2" in caplog.text
-    assert "loop levels=2" in caplog.text
 
 
 def test_503_for_the_list_while_no_worker_can_read_it():
@@ -132,7 +122,7 @@ def test_503_for_the_list_while_no_worker_can_read_it():
         began = time.monotonic()
         answer = client.get("/models")
         assert (answer.status_code, answer.json()["code"]) == (503, "busy")
-        assert subdivide(client, "model=paper").status_code == 503
+        assert asked(client, "model=paper").status_code == 503
         assert time.monotonic() - began < 10
 
 
@@ -179,19 +169,15 @@ def test_a_bundled_name_wins_over_that_of_the_served_file(serving, tmp_path):
     assert listed["paper", True]["hash"] == models.get().hash
 
 
-def test_a_served_file_that_does_not_load_has_a_name_and_no_entry(serving):
-    missing = serving("missing.onnx")
-    assert not any(default for _, default in entries_of(missing))
-    assert "missing" in catalogue_of(missing).names
-
-
-def test_a_model_that_leaves_polygons_to_the_classic_rule_says_so_when_it_is_loaded(
-    serving, tmp_path, caplog
-):
+def test_what_is_served_says_what_is_missing_when_it_is_loaded(serving, tmp_path, caplog):
+    """Polygons are left to the classic rule; a file that does not load has a name and no entry."""
     catalogue_of(serving(None))
     assert "companion" not in caplog.text
     catalogue_of(serving(served_file(tmp_path / "mine.onnx")))
     assert "model mine has no companion for polygons" in caplog.text
+    missing = serving("missing.onnx")
+    assert not any(default for _, default in entries_of(missing))
+    assert "missing" in catalogue_of(missing).names
 
 
 def test_every_model_runs_on_the_providers_that_are_set(serving):

@@ -19,20 +19,17 @@ FILES += ["/docs", *[f"/docs/{name}" for name in DOCS_FILES]]
 ADDRESS = re.compile(r'(?:src|href)="([^"#]+)"')
 
 
-def test_the_page_names_only_files_that_are_there_relative_to_itself():
-    addresses = set(ADDRESS.findall(CLIENT.get("/").text))
-    assert len(addresses) >= 4
-    assert addresses <= {f"assets/{path.name}" for path in ASSETS}
-
-
-def test_under_a_prefix_the_page_names_its_files_from_the_root_of_the_host():
-    client = local(create_app(Settings(workers=1, prefix="/tools/pns")))
+@pytest.mark.parametrize("prefix", ["", "/tools/pns"])
+def test_the_page_names_only_files_that_are_there(prefix):
+    """Relative to itself, or under a prefix from the root of the host."""
+    client = local(create_app(Settings(workers=1, prefix=prefix)))
     answer = client.get("/")
     addresses = set(ADDRESS.findall(answer.text))
     assert len(addresses) >= 4
-    assert addresses <= {f"/tools/pns/assets/{path.name}" for path in ASSETS}
-    assert answer.headers["ETag"] != CLIENT.get("/").headers["ETag"]
-    assert client.get("/openapi.json").json()["servers"] == [{"url": "/tools/pns"}]
+    base = f"{prefix}/" if prefix else ""
+    assert addresses <= {f"{base}assets/{path.name}" for path in ASSETS}
+    assert (answer.headers["ETag"] == CLIENT.get("/").headers["ETag"]) is not bool(prefix)
+    assert client.get("/openapi.json").json()["servers"] == [{"url": prefix or "/"}]
 
 
 @pytest.mark.parametrize("prefix", ["/", "tools", "/tools/", '/"onload', "//other.example"])
@@ -121,13 +118,10 @@ def test_the_first_visit_loads_less_than_350_kb():
     assert sum(sizes) + index < 350_000
 
 
-def test_the_description_and_all_that_it_names_are_there():
+def test_the_description_and_all_that_it_names_are_there_with_their_licences():
     named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', CLIENT.get("/docs").text)
     assert len(named) == 4
     for path in named:
         assert CLIENT.get(f"/{path}").status_code == 200, path
-
-
-def test_the_licences_are_with_it():
-    names = {path.name for path in DOCS.iterdir()}
-    assert {"LICENSE", "NOTICE", "swagger-ui-bundle.js.LICENSE.txt"} <= names
+    licences = {"LICENSE", "NOTICE", "swagger-ui-bundle.js.LICENSE.txt"}
+    assert licences <= {path.name for path in DOCS.iterdir()}

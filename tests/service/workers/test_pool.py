@@ -17,10 +17,9 @@ import pytest
 from pebble.common import CONSTS
 from pebble.pool import process as pebble_process
 
-from service.errors import GltfError, JobTimeout, WorkerDied
+from service.errors import JobTimeout, WorkerDied
 from service.workers import pool as pools
 from service.workers.pool import Workers
-from service.workers.worker import JobFaultError
 from tests.support import stand_in_jobs as jobs
 
 pytestmark = pytest.mark.anyio
@@ -62,18 +61,6 @@ def do(pool, function, *arguments, client="a"):
 async def until(holds):
     while not holds():
         await asyncio.sleep(0.005)
-
-
-async def test_errors_cross_the_process_boundary_and_the_worker_lives_on():
-    async with workers() as pool:
-        first = await do(pool, jobs.pid)
-        with pytest.raises(GltfError) as caught:
-            await do(pool, jobs.refuse)
-        assert caught.value.pointer == "/meshes/0"
-        with pytest.raises(JobFaultError, match="UnpicklableError"):
-            await do(pool, jobs.fault)
-        assert await do(pool, jobs.pid) == first
-        assert first != os.getpid()
 
 
 @pytest.mark.parametrize("frozen", [False, True])
