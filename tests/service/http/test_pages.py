@@ -5,7 +5,6 @@ import re
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
 
 from service.http.app import create_app
 from service.http.pages import DOCS, DOCS_FILES, DOCS_POLICY, MEDIA_TYPES, PAGE, PAGE_POLICY
@@ -30,12 +29,6 @@ def test_the_page_names_only_files_that_are_there(prefix):
     assert addresses <= {f"{base}assets/{path.name}" for path in ASSETS}
     assert (answer.headers["ETag"] == CLIENT.get("/").headers["ETag"]) is not bool(prefix)
     assert client.get("/openapi.json").json()["servers"] == [{"url": prefix or "/"}]
-
-
-@pytest.mark.parametrize("prefix", ["/", "tools", "/tools/", '/"onload', "//other.example"])
-def test_a_prefix_is_a_path_without_a_slash_at_its_end(prefix):
-    with pytest.raises(ValidationError, match="prefix"):
-        Settings(prefix=prefix)
 
 
 @pytest.mark.parametrize("path", FILES)
