@@ -58,90 +58,63 @@ def strips():
 
 
 def ply(beside="", behind="", points=PLY_POINTS, tail=""):
-    return (PLY_HEAD.format(beside, behind) + points + PLY_FACES + tail).encode()
+    return PLY_HEAD.format(beside, behind) + points + PLY_FACES + tail
 
 
+RGB = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+EDGES = "element edge 1\nproperty int vertex1\nproperty int vertex2\n"
+OTHERS = "property float quality\nproperty float other\n"
 CUBES = {
-    "obj: the old name of f": ("obj", (OBJ + OBJ_FACES.replace("f ", "fo ")).encode()),
-    "obj: normals that are no numbers": ("obj", (OBJ + "vn 0 0 1,\n" + OBJ_FACES).encode()),
-    "obj: a statement nobody knows": ("obj", (OBJ + "shadow_obj a\n\n" + OBJ_FACES).encode()),
-    "obj: in UTF-16": ("obj", (OBJ + OBJ_FACES).encode("utf-16")),
-    "obj: lines ended by returns": ("obj", (OBJ + OBJ_FACES).replace("\n", "\r").encode()),
-    "obj: no numbers, in Microsoft's words": (
-        "obj",
-        (OBJ + "vn -1.#IND 1.#QNAN -nan(ind)\n" + OBJ_FACES).encode(),
-    ),
-    "obj: behind a mark": ("obj", b"\xef\xbb\xbf" + (OBJ + OBJ_FACES).encode()),
-    "off: counts glued to the header": ("off", ("OFF8 6 0\n" + OFF_BODY).encode()),
-    "off: blanks before the header": ("off", ("\t  OFF8 6 12 # comment\n" + OFF_BODY).encode()),
-    "off: small letters": ("off", ("off\n8 6 0\n" + OFF_BODY).encode()),
-    "off: normals before colours": (
-        "off",
-        ("NCOFF\n8 6 0\n" + OFF_BODY.replace("\n", " 0 0 1 255 0 0 255\n", 8)).encode(),
-    ),
-    "off: words behind": ("off", ("OFF\n8 6 0\n" + OFF_BODY + "made by X\n").encode()),
-    "off: counts on lines": ("off", ("OFF\n8\n6\n0\n" + OFF_BODY).encode()),
-    "off: no count of edges": ("off", ("OFF\n8 6\n" + OFF_BODY).encode()),
-    "off: no header": ("off", ("# a\n8 6 12\n" + OFF_BODY).encode()),
-    "off: one number a line": ("off", ("OFF 8 6 0 " + OFF_BODY).replace(" ", "\n").encode()),
-    "off: comments and blank lines": (
-        "off",
-        ("# a\nOFF # b\n\n8 6 0\n# c\n" + OFF_BODY.replace("\n4", "\n\n#4\n4")).encode(),
-    ),
-    "ply: edges": (
-        "ply",
-        ply("", "element edge 1\nproperty int vertex1\nproperty int vertex2\n", tail="0 1\n"),
-    ),
-    "ply: blank lines": ("ply", ply().replace(b"end_header\n", b"end_header\n\n\n")),
-    "ply: vertices over two lines": (
-        "ply",
-        ply(
-            "property uchar red\nproperty uchar green\nproperty uchar blue\n",
-            points=PLY_POINTS.replace("\n", "\n255 0 0\n"),
-        ),
-    ),
-    "ply: a comment before the format": ("ply", ply().replace(b"ply\n", b"ply\ncomment a\n")),
-    "ply: a line without its keyword": (
-        "ply",
-        ply().replace(b"element face", b"Made by X\nelement face"),
-    ),
-    "ply: no numbers, in Microsoft's words": (
-        "ply",
-        ply(
-            "property float quality\nproperty float other\n",
-            points=PLY_POINTS.replace("\n", " -1.#IND -nan(ind)\n"),
-        ),
-    ),
-    "ply: a comment among the numbers": ("ply", ply().replace(b"3 0 3 2", b"comment b\n3 0 3 2")),
-    "ply: lines ended by returns": ("ply", ply().replace(b"\n", b"\r")),
-    "ply: strips": ("ply", strips()),
-    "stl: no end": ("stl", stl_text().encode()),
-    "stl: another end": ("stl", (stl_text() + "end solid part\n").encode()),
-    "stl: on one line": ("stl", stl_text().replace("\n", " ").encode()),
-    "stl: in capitals": ("stl", stl_text().upper().encode()),
-    "stl: a name of its own words": (
-        "stl",
-        (stl_text().replace("part", "vertex endloop") + "endsolid vertex endloop\n").encode(),
-    ),
-    "stl: of a big-endian machine": ("stl", stl_binary(order=">")),
-    "stl: bytes behind": ("stl", stl_binary() + b"tail"),
-    "stl: a header like a text": ("stl", stl_binary(b"solid part") + b"\r\n"),
-    "stl: a count of 0": ("stl", stl_binary(count=0)),
-    "stl: a count too large": ("stl", stl_binary(count=99)),
+    "obj": {
+        "the old name of f": OBJ + OBJ_FACES.replace("f ", "fo "),
+        "normals that are no numbers": OBJ + "vn 0 0 1,\n" + OBJ_FACES,
+        "a statement nobody knows": OBJ + "shadow_obj a\n\n" + OBJ_FACES,
+        "in UTF-16": (OBJ + OBJ_FACES).encode("utf-16"),
+        "lines ended by returns": (OBJ + OBJ_FACES).replace("\n", "\r"),
+        "no numbers, in Microsoft's words": OBJ + "vn -1.#IND 1.#QNAN -nan(ind)\n" + OBJ_FACES,
+        "behind a mark": "\ufeff" + OBJ + OBJ_FACES,
+    },
+    "off": {
+        "counts glued to the header": "OFF8 6 0\n" + OFF_BODY,
+        "blanks before the header": "\t  OFF8 6 12 # comment\n" + OFF_BODY,
+        "small letters": "off\n8 6 0\n" + OFF_BODY,
+        "normals, colours": "NCOFF\n8 6 0\n" + OFF_BODY.replace("\n", " 0 0 1 255 0 0 255\n", 8),
+        "words behind": "OFF\n8 6 0\n" + OFF_BODY + "made by X\n",
+        "counts on lines": "OFF\n8\n6\n0\n" + OFF_BODY,
+        "no count of edges": "OFF\n8 6\n" + OFF_BODY,
+        "no header": "# a\n8 6 12\n" + OFF_BODY,
+        "one number a line": ("OFF 8 6 0 " + OFF_BODY).replace(" ", "\n"),
+        "comments": "# a\nOFF # b\n\n8 6 0\n# c\n" + OFF_BODY.replace("\n4", "\n\n#4\n4"),
+    },
+    "ply": {
+        "edges": ply("", EDGES, tail="0 1\n"),
+        "blank lines": ply().replace("end_header\n", "end_header\n\n\n"),
+        "vertices over two lines": ply(RGB, points=PLY_POINTS.replace("\n", "\n255 0 0\n")),
+        "a comment before the format": ply().replace("ply\n", "ply\ncomment a\n"),
+        "a line without its keyword": ply().replace("element face", "Made by X\nelement face"),
+        "no numbers": ply(OTHERS, points=PLY_POINTS.replace("\n", " -1.#IND -nan(ind)\n")),
+        "a comment among the numbers": ply().replace("3 0 3 2", "comment b\n3 0 3 2"),
+        "lines ended by returns": ply().replace("\n", "\r"),
+        "strips": strips(),
+    },
+    "stl": {
+        "no end": stl_text(),
+        "another end": stl_text() + "end solid part\n",
+        "on one line": stl_text().replace("\n", " "),
+        "in capitals": stl_text().upper(),
+        "its own words": stl_text().replace("part", "vertex endloop") + "endsolid vertex endloop\n",
+        "of a big-endian machine": stl_binary(order=">"),
+        "bytes behind": stl_binary() + b"tail",
+        "a header like a text": stl_binary(b"solid part") + b"\r\n",
+        "a count of 0": stl_binary(count=0),
+        "a count too large": stl_binary(count=99),
+    },
 }
 
 
-def refined(data, kind, target, **options):
-    return converted(
-        data,
-        kind,
-        target,
-        Options(**{"scheme": "loop", "levels": 1} | options),
-        None,
-        Limits(),
-        None,
-        ALONE,
-    )
+def refined(data, kind, target, siblings=ALONE, **options):
+    options = Options(**{"scheme": "loop", "levels": 1} | options)
+    return converted(data, kind, target, options, None, Limits(), siblings=siblings)
 
 
 def area(mesh):
@@ -157,45 +130,36 @@ def is_closed(mesh):
     return len(there) == len(sides) and there == back
 
 
-@pytest.mark.parametrize("name", CUBES)
-def test_a_cube_is_read_however_it_is_written(name):
-    kind, data = CUBES[name]
+def assert_cube(data, kind):
     mesh = formats.read(data, kind)
     assert len(mesh.faces) == 12
     assert area(mesh) == pytest.approx(24, rel=1e-9)
     assert is_closed(mesh)
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in CUBES for name in CUBES[kind]])
+def test_a_cube_is_read_however_it_is_written(kind, name):
+    data = CUBES[kind][name]
+    data = data.encode() if isinstance(data, str) else data
+    assert_cube(data, kind)
     for target in ("glb", kind):
         assert refined(data, kind, target).report["totals"]["faces"] == 48
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "ply_ascii_edge_element.ply",
-        "ply_ascii_blank_lines.ply",
-        "ply_ascii_vertex_over_two_lines.ply",
-        "ply_comment_before_format.ply",
-        "ply_tristrips_binary.ply",
-        "ply_vertex_colours_binary.ply",
-        "obj_vertex_colours.obj",
-        "obj_two_materials.obj",
-        "obj_vn_trailing_comma.obj",
-        "obj_fo_statement.obj",
-        "off_counts_glued_to_header.off",
-        "off_leading_blanks.off",
-        "off_counts_on_lines.off",
-        "stl_ascii_no_endsolid.stl",
-        "stl_binary_trailing_bytes.stl",
-        "stl_binary_solid_header_crlf_tail.stl",
-    ],
-)
+COLLECTION = """
+ply_ascii_edge_element.ply ply_ascii_blank_lines.ply ply_ascii_vertex_over_two_lines.ply
+ply_comment_before_format.ply ply_tristrips_binary.ply ply_vertex_colours_binary.ply
+obj_vertex_colours.obj obj_two_materials.obj obj_vn_trailing_comma.obj obj_fo_statement.obj
+off_counts_glued_to_header.off off_leading_blanks.off off_counts_on_lines.off
+stl_ascii_no_endsolid.stl stl_binary_trailing_bytes.stl stl_binary_solid_header_crlf_tail.stl
+"""
+
+
+@pytest.mark.parametrize("name", COLLECTION.split())
 def test_the_collections_cubes_are_whole(name):
     path = shared_path("cases") / name
     data, kind = path.read_bytes(), path.suffix[1:]
-    mesh = formats.read(data, kind)
-    assert len(mesh.faces) == 12
-    assert area(mesh) == pytest.approx(24, rel=1e-9)
-    assert is_closed(mesh)
+    assert_cube(data, kind)
     made = refined(data, kind, "glb")
     assert made.report["totals"]["faces"] == 48
     (shown,) = files.unpack(made.content)[0]["meshes"]
@@ -203,24 +167,20 @@ def test_the_collections_cubes_are_whole(name):
     coloured = "COLOR_0" in shown["primitives"][0]["attributes"]
     assert coloured == ("colours" in name or "two_lines" in name)
     if "materials" in name:
-        assert (
-            len(formats.read(refined(data, kind, "obj").content, "obj").labels[MATERIAL].names) == 2
-        )
+        again = formats.read(refined(data, kind, "obj").content, "obj")
+        assert len(again.labels[MATERIAL].names) == 2
 
 
 def test_the_collections_hard_edges_are_as_hard_in_an_obj_as_in_a_glb():
     folder = shared_path("cases")
-    ours = refined(
-        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", crease="normals"
-    )
-    theirs = refined(
-        (folder / "obj_hard_edges_reference.glb").read_bytes(), "glb", "glb", crease="normals"
-    )
-    edges = [made.report["levels"][0]["edges"] for made in (ours, theirs)]
-    assert edges[0]["crease"] == edges[1]["crease"] > 0
-    smooth = refined(
-        (folder / "obj_hard_edges_by_vn.obj").read_bytes(), "obj", "glb", normals="smooth"
-    )
+    ours = (folder / "obj_hard_edges_by_vn.obj").read_bytes()
+    theirs = (folder / "obj_hard_edges_reference.glb").read_bytes()
+    edges = [
+        refined(data, kind, "glb", crease="normals").report["levels"][0]["edges"]["crease"]
+        for data, kind in ((ours, "obj"), (theirs, "glb"))
+    ]
+    assert edges[0] == edges[1] > 0
+    smooth = refined(ours, "obj", "glb", normals="smooth")
     (primitive,) = files.unpack(smooth.content)[0]["meshes"][0]["primitives"]
     assert "NORMAL" in primitive["attributes"]
 
@@ -312,9 +272,8 @@ def test_colours_of_faces_stay_with_the_faces_made_of_them():
 
 
 def test_colours_of_faces_below_those_of_vertices_are_reported():
-    colour = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     points, faces = PLY_POINTS.replace("\n", " 255 0 0 .5\n"), PLY_FACES.replace("\n", " 0 0 255\n")
-    head = PLY_HEAD.format(f"{colour}property float alpha\n", colour)
+    head = PLY_HEAD.format(f"{RGB}property float alpha\n", RGB)
     made = refined((head + points + faces).encode(), "ply", "glb")
     tree, binary = files.unpack(made.content)
     attributes = tree["meshes"][0]["primitives"][0]["attributes"]
@@ -356,28 +315,24 @@ def test_one_material_is_refined_and_its_neighbours_meet_it(target, levels):
         refined(data, "obj", target, material="m2")
 
 
+UV, EMBEDDED = {"TEXCOORD_0"}, {"embedded"}
+
+
 @pytest.mark.parametrize(
     ("name", "told", "layers"),
     [
-        ("A1_partial_uv.obj", set(), {"TEXCOORD_0"}),
-        ("A3_partial_normals.obj", set(), {"NORMAL"}),
-        ("F1_backslash_space.obj", set(), set()),
-        ("G1_constant_attribute.stl", set(), set()),
-        ("H1_texturefile.ply", set(), {"TEXCOORD_0"}),
-        ("I1_crease_tag.obj", set(), set()),
-        ("D1_sub/D1.obj", {"embedded"}, {"TEXCOORD_0"}),
-        ("D2/D2_windows_path.obj", {"embedded"}, {"TEXCOORD_0"}),
+        *(("A1_partial_uv.obj", set(), UV), ("A3_partial_normals.obj", set(), {"NORMAL"})),
+        *((name, set(), set()) for name in ("F1_backslash_space.obj", "G1_constant_attribute.stl")),
+        *(("H1_texturefile.ply", set(), UV), ("I1_crease_tag.obj", set(), set())),
+        *((name, EMBEDDED, UV) for name in ("D1_sub/D1.obj", "D2/D2_windows_path.obj")),
     ],
 )
 def test_files_of_the_fourth_collection_come_whole(name, told, layers):
     path = shared_path("cases") / "4" / name
-    kind = path.suffix[1:]
-    options = Options(scheme="loop", levels=1)
-    made = converted(path.read_bytes(), kind, kind, options, None, Limits(), None, folder_of(path))
+    kind, cut = path.suffix[1:], {"triangles added by cutting polygons"}
+    made = refined(path.read_bytes(), kind, kind, siblings=folder_of(path))
     assert set(formats.read(made.content, kind).layers) == layers
-    cut = {"triangles added by cutting polygons"}
     assert {change["what"] for change in made.report["changes"]} <= cut
     if told:
-        beside = folder_of(path)
-        glb = converted(path.read_bytes(), kind, "glb", options, None, Limits(), None, beside)
+        glb = refined(path.read_bytes(), kind, "glb", siblings=folder_of(path))
         assert {change["what"] for change in glb.report["changes"]} == told | cut
