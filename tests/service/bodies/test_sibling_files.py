@@ -47,7 +47,7 @@ def told_of_images(made):
     return [change for change in made.report["changes"] if change["pointer"].startswith("/images")]
 
 
-EMBEDDED = {"pointer": "/images/0", "what": "embedded", "count": 1}
+EMBEDDED = {"pointer": "/images/0", "code": "embedded", "what": "embedded", "count": 1}
 
 
 @pytest.mark.parametrize("step", ["%41", "a/", "a"])
@@ -111,7 +111,12 @@ def test_external_files_give_what_an_embedded_file_gives():
     view = tree["bufferViews"][image["bufferView"]]
     assert image["mimeType"] == "image/png"
     assert content[view["byteOffset"] :][: view["byteLength"]] == PNG
-    unused = {"pointer": "", "what": "not used by the document: notes.txt", "count": 1}
+    unused = {
+        "pointer": "",
+        "code": "unused-file",
+        "what": "not used by the document: notes.txt",
+        "count": 1,
+    }
     assert all(change in result.report["changes"] for change in (EMBEDDED, unused))
 
 
@@ -155,8 +160,8 @@ def test_an_image_that_cannot_be_embedded_keeps_its_uri_and_says_why(uri, why):
     images = [uri, "https://example.org/a.png"]
     result = with_images(*images, notes__txt=b"no image")
     assert files.unpack(result.glb)[0]["images"] == [{"uri": image} for image in images]
-    told = f"kept by its URI: {uri} {why}"
-    assert told_of_images(result) == [{"pointer": "/images/0", "what": told, "count": 1}]
+    told = {"code": "kept-by-uri", "what": f"kept by its URI: {uri} {why}"}
+    assert told_of_images(result) == [{"pointer": "/images/0", **told, "count": 1}]
 
 
 def test_an_image_in_the_json_comes_into_the_gltf_s_buffer():

@@ -24,8 +24,8 @@ def refined(tree, binary, **options):
     return subdivide(data=files.pack(tree, binary), **options)
 
 
-def change(what, count=1, pointer="/meshes/0"):
-    return {"pointer": pointer, "what": what, "count": count}
+def change(code, what, count=1, pointer="/meshes/0"):
+    return {"pointer": pointer, "code": code, "what": what, "count": count}
 
 
 def test_vertices_that_no_refined_face_uses_are_counted_once():
@@ -78,8 +78,10 @@ def test_degenerate_faces_are_dropped_and_reported():
     assert report["totals"]["faces"] == 32
     assert report["dropped"] == {"degenerate_faces": 3, "duplicate_faces": 0, "vertices": 0}
     assert report["changes"] == [
-        change("degenerate faces dropped", 2, PRIMITIVE),
-        change("left as it was: no face has an area", 1, "/meshes/0/primitives/1"),
+        change("degenerate-faces", "degenerate faces dropped", 2, PRIMITIVE),
+        change(
+            "left-as-it-was", "left as it was: no face has an area", 1, "/meshes/0/primitives/1"
+        ),
     ]
     before, after = files.unpack(files.glb([shape, shape]))[0], files.unpack(result.glb)[0]
     assert after["meshes"][0]["primitives"][1].keys() == before["meshes"][0]["primitives"][1].keys()
@@ -138,7 +140,7 @@ def test_points_and_lines_stay_untouched_and_that_is_told():
         assert tree["meshes"][0]["primitives"][number] == old["meshes"][0]["primitives"][number]
     # Edges drawn over a surface no longer lie on it. Beside none, nothing has moved.
     what = "points and lines left where they were, beside what is refined"
-    assert result.report["changes"] == [change(what, 2)]
+    assert result.report["changes"] == [change("lines-left", what, 2)]
 
 
 def test_instances_of_a_mesh_are_refined_once():
@@ -182,12 +184,14 @@ def test_what_goes_with_buffers_that_are_joined_is_told():
     result = refined(tree, binary)
     assert files.unpack(result.glb)[0]["buffers"][0]["name"] == "first"
     assert result.report["changes"] == [
-        change("joined into one", 2, "/buffers"),
-        change("left out, since buffers are one: extras, name", 1, "/buffers/1"),
+        change("buffers-joined", "joined into one", 2, "/buffers"),
+        change(
+            "buffer-properties", "left out, since buffers are one: extras, name", 1, "/buffers/1"
+        ),
     ]
     # Who knows the extension would look for a buffer 1.
     tree |= {"extensionsUsed": ["EXT_x"], "extensions": {"EXT_x": {"buffer": 1}}}
-    told = change("joined: EXT_x may name them by number", 2, "/buffers")
+    told = change("buffers-numbered", "joined: EXT_x may name them by number", 2, "/buffers")
     assert told in refined(tree, binary).report["changes"]
 
 
@@ -235,7 +239,7 @@ def test_the_report_lies_in_the_extras_of_the_asset_unless_it_is_not_wanted():
     result = refined(tree, binary)
     extras = files.unpack(result.glb)[0]["asset"]["extras"]
     assert extras == {"extras": ["a", "list"], "pns": result.report}
-    moved = change("moved to /asset/extras/extras", 1, "/asset/extras")
+    moved = change("extras-moved", "moved to /asset/extras/extras", 1, "/asset/extras")
     assert result.report["changes"] == [moved]
     result = subdivide([octahedron()], diagnostics="none")
     assert "extras" not in files.unpack(result.glb)[0]["asset"]
@@ -369,7 +373,9 @@ def test_extensions_of_accessors_that_are_written_anew_are_told():
     tree, binary = files.document([octahedron()])
     for accessor in accessors_of(tree):
         accessor["extensions"] = {"EXT_x": {"bufferView": 1}}
-    told = change("left out with the accessors that had them: EXT_x", 2, PRIMITIVE)
+    told = change(
+        "accessors-extended", "left out with the accessors that had them: EXT_x", 2, PRIMITIVE
+    )
     assert told in refined(tree, binary).report["changes"]
 
 
@@ -379,7 +385,7 @@ def test_texture_coordinates_that_become_floats_are_told():
     after, _ = files.unpack(result.glb)
     index = after["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
     assert after["accessors"][index]["componentType"] == files.COMPONENTS["f4"]
-    told = change("quantised attributes written as float32", 1, PRIMITIVE)
+    told = change("quantised", "quantised attributes written as float32", 1, PRIMITIVE)
     assert result.report["changes"] == [told]
 
 
@@ -397,7 +403,10 @@ def test_extensions_that_list_vertices_by_number_are_left_out_and_told(name):
     mesh, points = files.unpack(result.glb)[0]["meshes"]
     assert mesh["extensions"] == {"EXT_other": {}}
     assert points["extensions"] == tree["meshes"][1]["extensions"]
-    assert change(f"left out: {name}, by the numbers of vertices") in result.report["changes"]
+    assert (
+        change("numbers-of-vertices", f"left out: {name}, by the numbers of vertices")
+        in result.report["changes"]
+    )
     # What no mesh has any more is not declared.
     del tree["meshes"][0]["extensions"]["EXT_other"], tree["meshes"][1]["extensions"]
     tree["extensionsUsed"] = [name]

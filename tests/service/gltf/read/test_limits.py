@@ -330,7 +330,12 @@ def test_buffers_in_data_uris_are_read_and_joined():
             np.testing.assert_array_equal(attributes[name], values)
     (buffer,) = files.unpack(result.glb)[0]["buffers"]
     assert "uri" not in buffer
-    joined = {"pointer": "/buffers", "what": "joined into one", "count": 2}
+    joined = {
+        "pointer": "/buffers",
+        "code": "buffers-joined",
+        "what": "joined into one",
+        "count": 2,
+    }
     assert result.report["changes"] == [joined]
 
 

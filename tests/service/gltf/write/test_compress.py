@@ -143,7 +143,7 @@ def test_what_draco_cannot_hold_stays_uncompressed_and_is_named():
     after, _ = files.unpack(result.glb)
     assert "extensions" not in after["meshes"][0]["primitives"][0]
     assert "extensionsUsed" not in after
-    told = {"pointer": "/meshes/0/primitives/0", "what": UNHELD, "count": 1}
+    told = {"pointer": "/meshes/0/primitives/0", "code": "not-draco", "what": UNHELD, "count": 1}
     assert told in result.report["changes"]
 
 
