@@ -17,15 +17,7 @@ vertex twice and no two triangles have the same three.
 
 from __future__ import annotations
 
-from pns_common.kernels import (
-    Connectivity,
-    i1_1d,
-    i4_2d,
-    i8_2d,
-    inlined,
-    kernel,
-    u4_2d,
-)
+from pns_common.kernels import Connectivity, i1_1d, i4_2d, i8_2d, inlined, kernel, u4_2d
 from pns_common.kernels.connectivity import INTERIOR, following_corner, triangle_of
 
 QUAD = 4

@@ -1,4 +1,4 @@
-"""Connectivity of a mesh: edges, edge classes and sharpness, fans; the split into triangles.
+"""Connectivity of a mesh: edges, edge classes and sharpness, fans; splits of its faces.
 
 Nothing here knows positions. The orders are part of the result: edges are numbered by first
 appearance over the faces, (a, b), (b, c), … from each face's first corner on.
@@ -17,6 +17,7 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import Connectivity, loop, split
 from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
+from pns_common.mesh.sectors import find_sectors
 from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
@@ -265,18 +266,15 @@ class Topology:
         return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
+    def fan_count(self) -> Integer[np.ndarray, " V"]:
+        """Number of fans that the faces of each vertex form; creases divide none."""
+        around = find_sectors(self.without_creases().connectivity)
+        return np.bincount(around.vertex, minlength=self.vertex_count)
+
+    @property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
         """True for vertices whose faces form more than one fan, as at the knot of a bow-tie."""
-        return self.count_fans(Blocks()) > 1
-
-    def count_fans(self, blocks: Blocks) -> Integer[np.ndarray, " V"]:
-        """Return how many fans the faces of each vertex form: 0, 1, or 2 for more."""
-        corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
-        fans = np.empty(self.vertex_count, dtype=np.int8)
-        around = self.corners, self.corner_reach, corner, count
-        blocks.owners(len(fans)).run(len(fans), kernels.count_corners, *around)
-        blocks.run(len(fans), kernels.count_fans, self.connectivity, corner, count, fans)
-        return fans
+        return self.fan_count > 1
 
     def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
@@ -537,6 +535,25 @@ def split_faces(
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * len(parent.faces), TRIANGLE), dtype=dtype)
     blocks.run(parent.face_count, split.split_triangles, parent.connectivity, faces)
+    return faces
+
+
+def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> Topology:
+    """Return the topology of the split of faces of any degree into a quad for each corner.
+
+    The vertex of edge e is V + e, that of face f is V + E + f. The quad of corner h is (its vertex,
+    the vertex of the edge that leaves it, the face's vertex, that of the edge that enters it), and
+    it is face h of the refined mesh. Arguments are as of ``split_triangles``.
+    """
+    return split_into(quad_faces(parent, blocks), parent, blocks, inherit=inherit)
+
+
+def quad_faces(
+    parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
+) -> Integer[np.ndarray, "H 4"]:
+    """Return the quads of the split, in the order of ``split_quads``."""
+    faces = np.empty((len(parent.corners), QUAD), dtype=dtype)
+    blocks.run(parent.face_count, split.split_into_quads, parent.connectivity, faces)
     return faces
 
 

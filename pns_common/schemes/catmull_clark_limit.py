@@ -38,19 +38,19 @@ from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
 from pns_common.mesh.rows import ranges
-from pns_common.mesh.sectors import (
-    CLOSED,
-    CURVE,
-    DART,
-    LimitNormals,
-    find_sectors,
-    mask_tables,
-    sector_normals,
-)
+from pns_common.mesh.sectors import find_sectors
 from pns_common.mesh.topology import NO_WEIGHTS, Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
 from pns_common.schemes.catmull_clark_masks import place
+from pns_common.schemes.sector_masks import (
+    CLOSED,
+    CURVE,
+    DART,
+    LimitNormals,
+    mask_tables,
+    sector_normals,
+)
 
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 4.0, (7 - 45**0.5) / 2
@@ -89,7 +89,7 @@ def _dart_limits(
     placed: Float[np.ndarray, "W 3"], weight: Float[np.ndarray, " V"], topology: Topology
 ) -> Float[np.ndarray, "V 3"]:
     """Return limits, right at vertices on exactly one sharp edge; ``weight`` is k²."""
-    around, count = find_sectors(topology, quads=True), topology.vertex_count
+    around, count = find_sectors(topology.connectivity, quads=True), topology.vertex_count
     total, sums = weight.copy(), weight[:, None] * placed[:count]
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
     size = around.size[rows]
@@ -138,8 +138,8 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    around = find_sectors(topology, quads=True)
-    return sector_normals(place(points, topology, blocks), topology, around, tangent_mask, blocks)
+    placed = place(points, topology, blocks)
+    return sector_normals(placed, topology, tangent_mask, blocks, quads=True)
 
 
 def tangent_mask(kind: int, k: int) -> Float[np.ndarray, "N 2"]:

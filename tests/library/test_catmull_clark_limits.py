@@ -169,7 +169,7 @@ def test_tangents_of_a_dart_are_left_eigenvectors(k):
 def tangents(columns, topology, mask):
     """Both tangents at vertex 0, of the sector's points on the next mesh."""
     placed = CATMULL_CLARK.place(columns, topology, Blocks())
-    around = masks.find_sectors(topology)
+    around = masks.find_sectors(topology.connectivity)
     (row,) = np.flatnonzero(around.vertex == 0)
     h, count, edge_count = int(around.first[row]), topology.vertex_count, len(topology.edges)
     walked = []

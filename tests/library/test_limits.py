@@ -233,6 +233,6 @@ def test_a_vertex_of_a_hundred_thousand_spokes_has_limit_and_normal():
 
 @given(st.one_of(manifolds(), soups()))
 def test_every_corner_is_in_one_sector_of_its_own_vertex(mesh):
-    around = find_sectors(build_topology(mesh.faces, len(mesh.vertices)))
+    around = find_sectors(build_topology(mesh.faces, len(mesh.vertices)).connectivity)
     np.testing.assert_array_equal(around.vertex[around.of_corner], mesh.faces.reshape(-1))
     np.testing.assert_array_equal(np.bincount(around.of_corner), around.size)
