@@ -184,8 +184,8 @@ def test_an_image_that_cannot_be_embedded_keeps_its_uri_and_says_why(uri, why):
     result = refine(text, beside(box__bin=binary, notes__txt=b"no image"))
     assert files.unpack(result.glb)[0]["images"] == [{"uri": image} for image in images]
     changes = [c for c in result.report["changes"] if c["pointer"].startswith("/images")]
-    told = f"kept by its URI: {uri} {why}"
-    assert changes == [{"pointer": "/images/0", "what": told, "count": 1}]
+    told = {"code": "kept-by-uri", "what": f"kept by its URI: {uri} {why}"}
+    assert changes == [{"pointer": "/images/0", **told, "count": 1}]
 
 
 def test_an_image_in_the_json_comes_into_the_gltf_s_buffer():
@@ -199,7 +199,7 @@ def test_an_image_in_the_json_comes_into_the_gltf_s_buffer():
     others = [{"uri": "data:image/png;base64,AAAA"}, {"uri": "data:image/png,?"}]
     assert tree["images"] == [{"mimeType": "image/png"}, *others]
     changes = [c for c in result.report["changes"] if c["pointer"].startswith("/images")]
-    assert changes == [{"pointer": "/images/0", "what": "embedded", "count": 1}]
+    assert changes == [{"pointer": "/images/0", "code": "embedded", "what": "embedded", "count": 1}]
 
 
 def test_files_on_disk_are_read_from_their_own_folder_only(tmp_path):
@@ -243,6 +243,7 @@ def test_an_archive_holds_a_document_and_its_neighbours():
     assert result.report["totals"]["faces"] == 48
     assert {
         "pointer": "",
+        "code": "unused-file",
         "what": "not used by the document: readme.txt",
         "count": 1,
     } in result.report["changes"]
@@ -253,7 +254,7 @@ def test_a_document_names_files_elsewhere_in_its_archive():
     entries = [("x/gltf/box.gltf", text), ("x/parts/box.bin", binary), ("a.png", PNG)]
     main, siblings = open_archive(archive(entries), 2**20)
     changes = refine(main.content, siblings).report["changes"]
-    assert {"pointer": "/images/0", "what": "embedded", "count": 1} in changes
+    assert {"pointer": "/images/0", "code": "embedded", "what": "embedded", "count": 1} in changes
     assert not any(change["what"].startswith("not used") for change in changes)
 
 

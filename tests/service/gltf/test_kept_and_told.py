@@ -69,9 +69,15 @@ def test_degenerate_faces_are_dropped_and_reported():
     dropped = {"degenerate_faces": 3, "duplicate_faces": 0, "vertices": 0}
     assert result.report["dropped"] == dropped
     assert result.report["changes"] == [
-        {"pointer": "/meshes/0/primitives/0", "what": "degenerate faces dropped", "count": 2},
+        {
+            "pointer": "/meshes/0/primitives/0",
+            "code": "degenerate-faces",
+            "what": "degenerate faces dropped",
+            "count": 2,
+        },
         {
             "pointer": "/meshes/0/primitives/1",
+            "code": "left-as-it-was",
             "what": "left as it was: no face has an area",
             "count": 1,
         },
@@ -146,7 +152,9 @@ def test_points_and_lines_stay_untouched_and_that_is_told():
         assert primitive == old["meshes"][0]["primitives"][number]
     # Edges drawn over a surface no longer lie on it. Beside none, nothing has moved.
     what = "points and lines left where they were, beside what is refined"
-    assert result.report["changes"] == [{"pointer": "/meshes/0", "what": what, "count": 2}]
+    assert result.report["changes"] == [
+        {"pointer": "/meshes/0", "code": "lines-left", "what": what, "count": 2}
+    ]
 
 
 def test_instances_of_a_mesh_are_refined_once():
@@ -189,9 +197,10 @@ def test_what_goes_with_buffers_that_are_joined_is_told():
     result = subdivide(data=files.pack(tree, binary))
     assert files.unpack(result.glb)[0]["buffers"][0]["name"] == "first"
     assert result.report["changes"] == [
-        {"pointer": "/buffers", "what": "joined into one", "count": 2},
+        {"pointer": "/buffers", "code": "buffers-joined", "what": "joined into one", "count": 2},
         {
             "pointer": "/buffers/1",
+            "code": "buffer-properties",
             "what": "left out, since buffers are one: extras, name",
             "count": 1,
         },
@@ -201,6 +210,7 @@ def test_what_goes_with_buffers_that_are_joined_is_told():
     changes = subdivide(data=files.pack(tree, binary)).report["changes"]
     assert {
         "pointer": "/buffers",
+        "code": "buffers-numbered",
         "what": "joined: EXT_x may name them by number",
         "count": 2,
     } in changes
@@ -250,7 +260,12 @@ def test_extras_that_are_no_object_move_and_are_reported():
     extras = files.unpack(result.glb)[0]["asset"]["extras"]
     assert extras == {"extras": ["a", "list"], "pns": result.report}
     assert result.report["changes"] == [
-        {"pointer": "/asset/extras", "what": "moved to /asset/extras/extras", "count": 1}
+        {
+            "pointer": "/asset/extras",
+            "code": "extras-moved",
+            "what": "moved to /asset/extras/extras",
+            "count": 1,
+        }
     ]
 
 
@@ -390,6 +405,7 @@ def test_extensions_of_accessors_that_are_written_anew_are_told():
         tree["accessors"][index]["extensions"] = {"EXT_x": {"bufferView": 1}}
     assert {
         "pointer": "/meshes/0/primitives/0",
+        "code": "accessors-extended",
         "what": "left out with the accessors that had them: EXT_x",
         "count": 2,
     } in subdivide(data=files.pack(tree, binary)).report["changes"]
@@ -404,6 +420,7 @@ def test_texture_coordinates_that_become_floats_are_told():
     assert result.report["changes"] == [
         {
             "pointer": "/meshes/0/primitives/0",
+            "code": "quantised",
             "what": "quantised attributes written as float32",
             "count": 1,
         }
@@ -426,6 +443,7 @@ def test_extensions_that_list_vertices_by_number_are_left_out_and_told(name):
     assert points["extensions"] == tree["meshes"][1]["extensions"]
     assert {
         "pointer": "/meshes/0",
+        "code": "numbers-of-vertices",
         "what": f"left out: {name}, by the numbers of vertices",
         "count": 1,
     } in result.report["changes"]

@@ -119,7 +119,7 @@ def test_polygons_are_split_and_counted(kind: str) -> None:
     lost = {"colours of faces dropped": 3} if kind == "off" else {}
     assert told(mesh_file) == lost | {CUT: 3}
     _, report = refined(mesh_file)
-    assert {"pointer": "", "what": CUT, "count": 3} in report["changes"]
+    assert {"pointer": "", "code": "polygons-cut", "what": CUT, "count": 3} in report["changes"]
 
 
 def magics(*attributes: int) -> bytes:

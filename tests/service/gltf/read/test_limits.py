@@ -141,7 +141,7 @@ def test_buffers_in_data_uris_are_read_and_joined():
     assert len(after["buffers"]) == 1
     assert "uri" not in after["buffers"][0]
     assert result.report["changes"] == [
-        {"pointer": "/buffers", "what": "joined into one", "count": 2}
+        {"pointer": "/buffers", "code": "buffers-joined", "what": "joined into one", "count": 2}
     ]
 
 

@@ -141,7 +141,7 @@ def test_a_broken_promise_is_refused_with_its_pointer(path, value, pointer):
 def test_a_node_with_several_parents_is_reported_and_left(nodes, pointer, count):
     changes = refine(edited(put("/nodes", nodes))).report["changes"]
     what = "found, and left: nodes with more than one parent"
-    assert {"pointer": pointer, "what": what, "count": count} in changes
+    assert {"pointer": pointer, "code": "breach", "what": what, "count": count} in changes
 
 
 @pytest.mark.parametrize(
