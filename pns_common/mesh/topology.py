@@ -386,15 +386,13 @@ class Topology:
         """Return a copy without soft edges and learned corners: what a user or a file marks."""
         return replace(self, soft=NO_WEIGHTS, soft_corners=NO_WEIGHTS)
 
-    def rows_of(
-        self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
-    ) -> Integer[np.ndarray, " N"]:
+    def rows_of(self, pairs: Integer[np.ndarray, "N 2"]) -> Integer[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
-            ParameterError: a pair is no edge; ``name`` is the argument's.
+            ParameterError: a pair is no edge.
         """
-        check_vertices(name, pairs, self.vertex_count)
+        check_vertices("creases", pairs, self.vertex_count)
         named = marked(pairs, self.vertex_count)
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
         keys, asked = (_keys(ends, self.vertex_count) for ends in (self.edges[near], pairs))
@@ -404,9 +402,8 @@ class Topology:
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(
-                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
-            )
+            pair = pairs[row].tolist()
+            raise ParameterError(f"creases[{row}]", pair, expected="an edge of the mesh")
         return near[order[place]]
 
 
@@ -440,7 +437,7 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
     repeats, repeating = np.zeros(0, dtype=bool), False
     if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
@@ -507,9 +504,8 @@ def split_into(
     count += 2 * edge_count
     edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
     edge_class, soft = np.empty(count, np.int8), NO_WEIGHTS
-    write = split.split_edges_into_quads if quads else split.split_edges_of_triangles
     to = corner_edges, edges, half_edges, edge_class
-    blocks.run(parent.face_count, write, read, halves, *to)
+    blocks.run(parent.face_count, split.split_edges, read, quads, halves, *to)
     if inherit and len(parent.soft):
         rows, soft = np.flatnonzero(parent.soft), np.zeros(count)
         soft[halves[rows]] = parent.soft[rows, None]
@@ -584,10 +580,7 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"],
-    offsets: Integer[np.ndarray, " F1"],
-    vertex_count: int,
-    blocks: Blocks,
+    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -599,8 +592,9 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
-    blocks.quiet().run(made, kernels.read_links, low, links, edges, half_edges)
+    edges, links = np.empty((made, 2), np.uint32), links[:made]
+    edges[:, 0], edges[:, 1] = low[:made], links[:, kernels.HIGH]
+    half_edges = np.ascontiguousarray(links[:, kernels.FIRST :])
     return edges, half_edges, corner_edges, bool(plain[0])
 
 

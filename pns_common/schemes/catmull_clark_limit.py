@@ -52,6 +52,8 @@ from pns_common.schemes.sector_masks import (
     sector_normals,
 )
 
+# A neighbour's weight, in units of an opposite corner's.
+EDGE = 4
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 4.0, (7 - 45**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -71,16 +73,20 @@ def limit_positions(
     mesh, count = topology, topology.vertex_count
     none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
     smooth = replace(mesh, **none)
-    placed = place(points, smooth, blocks)
-    sums, read = np.empty((count, WIDTH + 1)), (placed, mesh.connectivity, mesh.corner_reach)
-    blocks.owners(count).run(count, kernels.sum_limit_corners, *read, sums)
-    limits = sums[:, :WIDTH].copy()
+    placed, edge_count = place(points, smooth, blocks), len(mesh.edges)
+    vertices, edges, faces = np.split(placed, [count, count + edge_count])
+    sums, counts = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
+    around = edges, faces, mesh.connectivity, mesh.corner_reach, True, EDGE / 2
+    blocks.owners(count).run(count, kernels.sum_corners, *around, sums, counts)
+    k = counts[:, None].astype(np.float64)
+    limits = (k * k * vertices + sums) / np.maximum(k * (k + 5), 1)
+    few = counts < kernels.LEAST_CORNERS
+    limits[few] = vertices[few]
     # Without an edge of sharpness 1 nothing is counted.
     darts = np.flatnonzero(mesh.sharp_count == DART)
-    darts = darts[sums[darts, WIDTH] >= kernels.LEAST_CORNERS]
+    darts = darts[~few[darts]]
     if len(darts):
-        weight = sums[:, WIDTH] ** 2
-        limits[darts] = _dart_limits(placed, weight, mesh)[darts]
+        limits[darts] = _dart_limits(placed, k[:, 0] ** 2, mesh)[darts]
     follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
