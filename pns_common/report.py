@@ -11,9 +11,8 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
 from pns_common.mesh.normals import face_normals
-from pns_common.mesh.quads import quad_faces
 from pns_common.mesh.rows import dot
-from pns_common.mesh.topology import EdgeClass, Topology, split_faces
+from pns_common.mesh.topology import EdgeClass, Topology, quad_faces, split_faces
 from pns_common.operator.formula import Additions
 from pns_common.parallel import Blocks
 
