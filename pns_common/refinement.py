@@ -13,10 +13,9 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh.creases import Creases, chosen_creases, one_of_creases
 from pns_common.mesh.mesh import Mesh, check_is_mesh
-from pns_common.mesh.quads import QUAD
 from pns_common.mesh.reference_length import measure_reference_length
 from pns_common.mesh.selection import chosen_faces, select
-from pns_common.mesh.topology import TRIANGLE
+from pns_common.mesh.topology import QUAD, TRIANGLE
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import NAMES, Scheme, named_scheme
 from pns_common.operator.sharpness import with_sharp_edges

@@ -129,8 +129,9 @@ def failed(path: str, output: str, error: Exception) -> Row:
 
 def _refine(task: Task) -> Row:
     from ..bodies.sibling_files import Opened
+    from ..changes import lines_of, with_changes
     from ..meshfiles.companions import companions, copied
-    from ..meshfiles.convert import converted, lines_of, with_changes
+    from ..meshfiles.convert import converted
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)
