@@ -87,7 +87,9 @@ def angle_weighted_normals(
         ),
     )
     kernels.add_corners(normals, angles, groups, triangles, total)
-    blocks.quiet().run(count, lambda begin, end: kernels.scale_to_unit(begin, end, total))
+    # Blocks of groups, not of faces of many triangles.
+    each = Blocks(blocks.threads)
+    each.run(count, lambda begin, end: kernels.scale_to_unit(begin, end, total))
     return total
 
 
