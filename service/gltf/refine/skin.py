@@ -66,7 +66,7 @@ class SkinAndMorph:
 
     @property
     def losses(self) -> tuple[int, float]:
-        """How many vertices lost weight, and the most that one of them lost."""
+        """Number of vertices that lost weight, and the most that one of them lost."""
         shares = np.zeros(0) if self.lost is None else self.lost[self.lost > NOTHING]
         return len(shares), float(shares.max(initial=0.0))
 

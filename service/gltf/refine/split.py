@@ -29,7 +29,7 @@ from .polygons import KeptFaces
 
 
 class Values(Protocol):
-    """What carries values of rows to refined rows."""
+    """A map from values of rows to those of refined rows."""
 
     def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
         """Return linear blends."""
@@ -67,7 +67,7 @@ class Split(Protocol):
 
     @property
     def counts(self) -> Int[np.ndarray, " Q"]:
-        """How many refined faces each kept face has."""
+        """Number of refined faces of each kept face."""
         ...
 
     def part(self, *chosen: slice) -> Split:

@@ -1,4 +1,4 @@
-"""What kept faces are split into: copies meet their faces, names stay those of nearest corners."""
+"""Splits of kept faces: copies meet their faces, names stay those of nearest corners."""
 
 import numpy as np
 import pytest
