@@ -22,8 +22,8 @@ from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, Bends, count_bends
+from ...changes import Change
 from ...options import Options
-from ...report import Change
 from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
 from .attributes import RefinedPrimitive, refined_primitives
@@ -91,7 +91,7 @@ class MeshOutcome:
         """Return the outcome of another mesh with this geometry."""
         before, after = (f"/meshes/{index}" for index in (self.index, mesh))
         moved = [
-            Change(after + change.pointer.removeprefix(before), change.what, change.count)
+            replace(change, pointer=after + change.pointer.removeprefix(before))
             for change in self.changes
         ]
         return replace(self, index=mesh, changes=moved)
