@@ -19,6 +19,7 @@ from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .control_mesh import NO_NORMAL, ControlMesh
 from .normals import corner_normals, safe_unit
+from .polygons import triangles_of
 
 # An edge whose faces' normals have a cosine this far below 1 is bent: a twelfth of a degree.
 BENT = 1e-6
@@ -116,7 +117,8 @@ def with_smooth_normals(
     fans = smooth_fans(control.mesh.faces, len(control.mesh.vertices), creases)
     count = int(fans.max()) + 1
     values = safe_unit(corner_normals(control.mesh.vertices, control.mesh.faces, fans, count))
-    fan, turned = _of_kept_faces(control, fans)
+    kept = triangles_of(control.weld.faces, control.cleaned)
+    fan, turned = fans.reshape(-1)[kept.source].reshape(-1, 3), kept.turned
     primitives: list[TrianglePrimitive] = []
     start = 0
     for primitive, keep in zip(control.primitives, control.kept, strict=True):
@@ -130,20 +132,6 @@ def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str
     """Return the accessors of a primitive with normals; a new one if it had none."""
     plain = Accessor(component_type=FLOAT, count=count, type="VEC3")
     return {"NORMAL": plain} | accessors
-
-
-def _of_kept_faces(
-    control: ControlMesh, fans: Int[np.ndarray, "F 3"]
-) -> tuple[Int[np.ndarray, "P 3"], Bool[np.ndarray, " P"]]:
-    """Return the fans of the corners of all kept faces, and which faces are reversed copies."""
-    cleaned, proper = control.cleaned, np.concatenate(control.kept)
-    leader = cleaned.representative[proper]
-    if np.array_equal(leader, np.arange(len(fans))):
-        return fans, np.zeros(len(fans), dtype=bool)
-    own = cleaned.vertex_map[control.weld.faces[proper]]
-    place = (own[:, :, None] == cleaned.mesh.faces[leader][:, None, :]).argmax(axis=2)
-    turned = (place[:, 1] - place[:, 0]) % 3 != 1
-    return np.take_along_axis(fans[leader], place, axis=1), turned
 
 
 def _with_normals(
