@@ -13,9 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.carry import rules
-from pns_common.carry.carried import Column, in_type_of, refine_column
-from pns_common.carry.charts import chart_points, charts_of, refine_charts
-from pns_common.carry.columns import level_topologies
+from pns_common.carry.carried import Carrier, Column
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh, fans
 from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
@@ -204,11 +202,12 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
 def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners, selected = made.mesh.corners, made.selected
-    counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
-    of_face = np.repeat(control.faces, counts)
-    layers: dict[str, Layer] = {}
-    for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, made, options)
+    carrier = Carrier(made.topologies, CATMULL_CLARK, options.limit, Blocks(available_threads()))
+    of_face = control.faces[carrier.face_parents]
+    layers = {
+        name: _refined(name, layer, control, carrier, options)
+        for name, layer in mesh.layers.items()
+    }
     still = np.zeros(0, dtype=np.int64)
     if selected is not None:
         of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
@@ -268,35 +267,25 @@ def _with(
 
 
 def _refined(
-    name: str, layer: Layer, control: _Control, made: Refinement, options: Options
+    name: str, layer: Layer, control: _Control, carrier: Carrier, options: Options
 ) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
-    values, mesh, blocks = layer.values, control.mesh, Blocks(available_threads())
-    bare = np.logical_or.reduceat(rows < 0, mesh.offsets[:-1])
+    values = layer.values[np.maximum(rows, 0)]
     if name == UV and options.uv == "smooth":
-        points, first = chart_points(mesh.corners, values[np.maximum(rows, 0)])
-        charts = charts_of(points, made.topologies, CATMULL_CLARK, blocks)
-        column = values[np.maximum(rows[first], 0)].astype(np.float64)
-        column, corners = refine_charts(column, charts, CATMULL_CLARK, blocks, limit=options.limit)
-        column = in_type_of(values, column)
+        column = Column(values, rules.smooth)
     else:
-        label = distinct_rows(np.stack([mesh.corners, rows], axis=1))
-        points, first = number_by_first_appearance(label)
         whole = values.dtype.kind != "f" and name != COLOUR
-        faces = points, mesh.offsets
-        charts = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
-        own = Column(values[np.maximum(rows[first], 0)], rules.nearest if whole else rules.linear)
-        column = refine_column(own, charts, CATMULL_CLARK)
-        corners = CATMULL_CLARK.faces(charts[-1], blocks, np.int64)
-    corners = corners.reshape(-1)
-    if bare.any():
-        counts = 4 * np.diff(mesh.offsets) * 4 ** (options.levels - 1)
-        bare = np.repeat(bare, counts)
-        used, inside = np.unique(corners[~bare], return_inverse=True)
-        column, corners = column[used], np.full(len(corners), NONE)
-        corners[~bare] = inside
-    return Layer(column, corners)
+        column = Column(values, rules.nearest if whole else rules.linear, same=rows[:, None])
+    values, corners = carrier.at_points(column)
+    bare = np.logical_or.reduceat(rows < 0, control.mesh.offsets[:-1])
+    if not bare.any():
+        return Layer(values, corners)
+    bare = np.repeat(bare[carrier.face_parents], 4)
+    used, inside = np.unique(corners[~bare], return_inverse=True)
+    corners = np.full(len(corners), NONE)
+    corners[~bare] = inside
+    return Layer(values[used], corners)
 
 
 def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
