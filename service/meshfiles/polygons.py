@@ -29,8 +29,9 @@ from pns_common.schemes import CATMULL_CLARK
 from ..advice import Bends, count_bends
 from ..errors import UnrefinableError
 from ..gltf.refine.changes import near_miss_changes, near_misses
-from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
+from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.normals import safe_unit
+from ..meshes.creases import chosen_creases, hard_edges
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Options
 from ..report import Change
@@ -172,9 +173,7 @@ def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
 
 
 def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
-    if options.crease == "normals":
-        return Creases(_hard_edges(control, mesh), border=options.border)
-    found = replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    found = chosen_creases(control.mesh, options, scheme, lambda: _hard_edges(control, mesh))
     if options.crease != "auto" or mesh.tags is None:
         return found
     vertex_of = np.full(len(mesh.vertices), NONE)
@@ -183,20 +182,14 @@ def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme
 
 
 def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges whose two faces carry different normals at both ends."""
+    """Return the edges that normals make hard; a corner without one makes none so."""
     normals = mesh.layers.get(NORMAL)
-    topology = control.mesh.topology()
-    edges = topology.edges[topology.interior].astype(np.int64)
     if normals is None:
-        return edges[:0]
-    row = distinct_rows(normals.values)[normals.rows[control.places]]
-    row[normals.rows[control.places] < 0] = NONE
-    there, back = topology.half_edges[topology.interior].T
-    follow = following(control.mesh.offsets)
-    hard = np.ones(len(edges), dtype=bool)
-    for one, other in ((there, follow[back]), (follow[there], back)):
-        hard &= (row[one] >= 0) & (row[other] >= 0) & (row[one] != row[other])
-    return edges[hard]
+        return np.zeros((0, 2), dtype=np.int64)
+    label = distinct_rows(normals.values)
+    label[~normals.values.any(axis=1)] = NONE
+    rows = normals.rows[control.places]
+    return hard_edges(control.mesh.topology(), np.where(rows < 0, NONE, label[rows]))
 
 
 def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
