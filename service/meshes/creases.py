@@ -1,4 +1,4 @@
-"""Which edges of a mesh the options keep sharp: the one place that reads `crease` for them."""
+"""Edges of a mesh that the options keep sharp: the one place that reads `crease` for them."""
 
 from __future__ import annotations
 
