@@ -13,9 +13,13 @@ import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
 from pns_common.kernels import limit as kernels
+from pns_common.mesh.rows import norm, unit
 from pns_common.mesh.topology import Topology
+from pns_common.parallel import Blocks
 
 CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
+# A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
+CANCELLED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,8 @@ class Sectors:
         size: how many corners it has.
         opened: how many sectors are open; these come first.
         vertex: of each sector.
+        spokes: vertices around these, sector by sector; see ``kernels.limit``.
+        starts: where the spokes of each sector begin, and their number at the end.
     """
 
     of_corner: Integer[np.ndarray, " C"]
@@ -50,23 +56,21 @@ class Sectors:
     size: Integer[np.ndarray, " S"]
     opened: int
     vertex: Integer[np.ndarray, " S"]
+    spokes: Integer[np.ndarray, " K"]
+    starts: Integer[np.ndarray, " S1"]
 
 
-def find_sectors(topology: Topology) -> Sectors:
-    """Return the sectors of a mesh."""
-    corners, *walked = walked_arrays(topology)
+def find_sectors(topology: Topology, *, quads: bool = False) -> Sectors:
+    """Return the sectors of a mesh; ``quads``: with spokes in the quads that corners become."""
+    corners = topology.corners
     of_corner = np.full(len(corners), -1, dtype=np.int32)
     first, size = np.empty((2, len(corners)), dtype=np.int32)
-    opened, count = kernels.label_sectors(*walked, of_corner, first, size)
-    first = first[:count].copy()
-    return Sectors(of_corner, first, size[:count].copy(), opened, corners[first])
-
-
-def walked_arrays(topology: Topology) -> tuple[np.ndarray, ...]:
-    """Return what a walk around a vertex reads."""
-    mesh = topology
-    of_faces = mesh.corners, mesh.offsets, mesh.face_of_corner
-    return *of_faces, mesh.corner_edges, mesh.half_edges, mesh.edge_class
+    spokes = np.empty((3 if quads else 2) * len(corners), dtype=np.uint32)
+    to = of_corner, first, size, spokes
+    opened, count = kernels.label_sectors(topology.connectivity, quads, *to)
+    first, size = first[:count].copy(), size[:count].copy()
+    starts = np.append(0, np.cumsum(1 + (2 if quads else 1) * size.astype(np.int64)))
+    return Sectors(of_corner, first, size, opened, corners[first], spokes, starts)
 
 
 def sector_kinds(topology: Topology, around: Sectors) -> Integer[np.ndarray, " S"]:
@@ -84,13 +88,23 @@ def sector_kinds(topology: Topology, around: Sectors) -> Integer[np.ndarray, " S
     return kind
 
 
-def normals_of_sectors(
-    sectors: Float[np.ndarray, "S 3"], around: Sectors, vertex_count: int
+def sector_normals(
+    points: Float[np.ndarray, "V 3"],
+    topology: Topology,
+    around: Sectors,
+    mask: Callable[[int, int], np.ndarray],
+    blocks: Blocks,
 ) -> LimitNormals:
-    """Return normals of vertices beside those of their sectors."""
-    vertices, lengths = np.zeros((vertex_count, 3)), np.zeros(vertex_count)
-    kernels.mean_of_sectors(sectors, around.vertex, vertices, lengths)
-    return LimitNormals(vertices, sectors, around.of_corner)
+    """Return normals by tangent masks, ``mask(kind, size)``; ``points`` hold spokes too."""
+    kind, count = sector_kinds(topology, around), topology.vertex_count
+    at, masks = mask_tables(mask, kind, around.size)
+    normals = np.empty((len(kind), 3))
+    read = around.vertex, around.starts, around.spokes, at, masks, kind == CORNER
+    blocks.run(len(kind), kernels.sector_normals, points, *read, normals)
+    lengths = np.bincount(around.vertex, norm(normals), count)
+    means = np.stack([np.bincount(around.vertex, own, count) for own in normals.T], axis=1)
+    means[norm(means) <= CANCELLED * lengths] = 0.0
+    return LimitNormals(unit(means), normals, around.of_corner)
 
 
 def mask_tables(

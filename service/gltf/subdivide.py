@@ -11,9 +11,10 @@ from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme, catmull_clark, named_scheme, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..changes import Change
 from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
-from ..report import Change, MeshResult, build_report
+from ..report import MeshResult, build_report
 from ..stages import Stages
 from .read.container import encode, write_glb
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
@@ -298,5 +299,5 @@ def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
     changes: list[Change] = []
     if options.diagnostics != "none" and replaces_extras(upload.tree):
-        changes.append(Change("/asset/extras", "moved to /asset/extras/extras", 1))
+        changes.append(Change("/asset/extras", "extras-moved", 1))
     return changes

@@ -129,9 +129,10 @@ def _refine(task: Task) -> Row:
     from pns_common.errors import PnsError
 
     from ..bodies.sibling_files import Opened
+    from ..changes import lines_of, with_changes
     from ..memory_cap import memory_cap
     from ..meshfiles.companions import companions, copied
-    from ..meshfiles.convert import converted, lines_of, with_changes
+    from ..meshfiles.convert import converted
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)

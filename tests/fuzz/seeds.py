@@ -7,7 +7,6 @@ import io
 import json
 import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import DracoPy
 import meshopt
@@ -33,7 +32,7 @@ class Seed:
     body: bytes
 
 
-def seeds(folder: Path | None) -> list[Seed]:
+def seeds(folder):
     """Everything that a run starts from."""
     all_seeds = made()
     for path in sorted(folder.rglob("*.gl*")) if folder is not None else []:
@@ -43,7 +42,7 @@ def seeds(folder: Path | None) -> list[Seed]:
     return all_seeds
 
 
-def made() -> list[Seed]:
+def made():
     """Small files for each thing that the reader looks at."""
     trees = {
         "plain": plain(),

@@ -6,8 +6,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, ParameterError, catmull_clark, load_model, loop, pns
-from pns_common.carry.charts import refine_corners
-from pns_common.carry.columns import refine_columns
 from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
@@ -130,18 +128,6 @@ def test_vertices_are_sharp_at_as_many_levels_as_edges_unless_said_otherwise():
     made = refine(mesh, loop(), 4, creases=told)
     assert [topology.corner_weights[3] for topology in made.topologies] == [1, 1, 0.25, 0]
     assert not any(topology.corner_weights[4] for topology in made.topologies)
-
-
-@pytest.mark.parametrize("base", [LOOP, CATMULL_CLARK])
-def test_columns_and_values_of_corners_keep_the_corners_of_the_surface(base):
-    shape = bumpy_sphere() if base is LOOP else SHAPES["mixed"]
-    mesh = Mesh(uneven(shape[0]), shape[1])
-    kept = Creases(vertices=[0, 5], vertex_sharpness=[2, np.inf])
-    made = refine(mesh, base.name, 2, creases=kept)
-    refined, faces = made.mesh.vertices, made.mesh.faces
-    np.testing.assert_array_equal(refine_columns(mesh.vertices, made.topologies, base), refined)
-    at_corners = refine_corners(mesh.vertices[mesh.corners], made.topologies, base)
-    np.testing.assert_allclose(at_corners, refined[faces], rtol=0, atol=1e-14)
 
 
 def test_a_sharp_corner_of_a_border_is_that_of_the_rule_of_corners():

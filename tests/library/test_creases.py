@@ -19,21 +19,6 @@ def placed(mesh, sharpness):
     return LOOP.place(mesh.vertices, topology, Blocks())
 
 
-def masks_of(mesh, sharpness):
-    """The mask matrix: what each unit vector becomes."""
-    topology = build_topology(mesh.faces, len(mesh.vertices)).with_sharpness(sharpness)
-    return LOOP.place(np.eye(len(mesh.vertices)), topology, Blocks())
-
-
-@given(soups() | manifolds(), seeds)
-def test_masks_are_means_for_any_sharpness(mesh, seed):
-    """All rows are ≥ 0 with sum 1, so bounds on displacements hold on the limit surface."""
-    count = len(build_topology(mesh.faces, len(mesh.vertices)).edges)
-    rows = masks_of(mesh, np.random.default_rng(seed).uniform(0, 1, count))
-    assert rows.min() >= -1e-15
-    np.testing.assert_allclose(rows.sum(axis=1), 1, atol=1e-13)
-
-
 @given(soups() | manifolds(), seeds)
 def test_sharpness_0_and_1_are_the_smooth_rules_and_those_of_creases(mesh, seed):
     topology = build_topology(mesh.faces, len(mesh.vertices))

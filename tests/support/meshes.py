@@ -41,17 +41,6 @@ def grid(n=6, height=None):
     return np.stack([x, y, z], axis=-1).reshape(-1, 3), faces
 
 
-def axis_planes():
-    """Uneven patches of planes across each of the three axes."""
-    vertices, faces = grid(6)
-    rng = np.random.default_rng(0)
-    for axis in range(3):
-        plane = vertices.copy()
-        plane[:, :2] += 0.1 * rng.standard_normal((len(plane), 2))
-        plane[:, 2] = rng.uniform(-5, 5)
-        yield Mesh(np.roll(plane, axis, axis=1), faces)
-
-
 def tilted_plane(seed):
     """An uneven patch of a plane that lies anyhow."""
     rng = np.random.default_rng(seed)

@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from ...bodies.media import GLTF_KINDS
 from ...bodies.sibling_files import ALONE, Opened, SiblingFiles, has_scheme
+from ...changes import Change, counted
 from ...errors import ServiceError
 from ...options import BYTES_PER_INPUT_BYTE, Limits
-from ...report import Change
 from .checks import breaches, refuse_features, refuse_version
 from .compressed import decode_primitives, decode_views
 from .container import Container, decode_object, decoded_size, read_container
@@ -84,18 +84,11 @@ def read_upload(
     unknown = unknown_extensions(tree, container.text)
     changes += _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
     changes += numbered
-    changes += [
-        Change(pointer, what, count)
-        for pointer, what, count in (
-            ("/bufferViews", "meshopt compression decoded", len(ranges)),
-            ("/meshes", "Draco compression decoded", len(draco_views)),
-        )
-        if count
-    ]
+    changes += counted({"meshopt-decoded": len(ranges)}, "/bufferViews")
+    changes += counted({"draco-decoded": len(draco_views)}, "/meshes")
     changes += images
-    if container.tail:
-        changes.append(Change("", "bytes behind the GLB left out", container.tail))
-    changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
+    told = {("unused-file", name): 1 for name in opened.unused}
+    changes += counted({"bytes-behind": container.tail, **told})
     changes += check_nodes(document)
     changes += breaches(document)
     refuse_features(document)
@@ -111,15 +104,15 @@ def _changes_of_buffers(
     entries: Sequence[dict[str, Any]], files: int, unknown: Sequence[str]
 ) -> list[Change]:
     """Return the changes of joining buffers into one."""
-    changes = [Change("/buffers", "joined into one", files)] if files > 1 else []
+    changes = [Change("/buffers", "buffers-joined", files)] if files > 1 else []
     if changes and unknown:
         names = ", ".join(unknown)
-        changes.append(Change("/buffers", f"joined: {names} may name them by number", files))
+        changes.append(Change("/buffers", "buffers-numbered", files, (names,)))
     for number, entry in enumerate(entries[1:], 1):
         lost = sorted(entry.keys() - {"uri", "byteLength"})
         if lost:
-            what = f"left out, since buffers are one: {', '.join(lost)}"
-            changes.append(Change(f"/buffers/{number}", what, 1))
+            names = ", ".join(lost)
+            changes.append(Change(f"/buffers/{number}", "buffer-properties", 1, (names,)))
     return changes
 
 

@@ -10,19 +10,19 @@ from service.meshfiles.text import rows_text
 FORMS = ["%.12g %.12g\n", "v %.7g/%.7g\n"]
 
 
-def by_printf(form: str, rows: np.ndarray) -> bytes:
+def by_printf(form, rows):
     return b"".join((form % tuple(row)).encode() for row in (rows + 0).tolist())
 
 
 @pytest.mark.parametrize("form", FORMS)
 @given(numbers=st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=1, max_size=40))
-def test_any_number(form: str, numbers: list[float]) -> None:
+def test_any_number(form, numbers):
     rows = np.array(numbers)[:, None].repeat(2, axis=1)
     assert b"".join(rows_text(form, rows)) == by_printf(form, rows)
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_numbers_of_all_sizes_ties_and_what_rounds_to_a_power_of_ten(form: str) -> None:
+def test_numbers_of_all_sizes_ties_and_what_rounds_to_a_power_of_ten(form):
     random = np.random.default_rng(7)
     exponents = random.integers(-11, 22, 20_000)
     mantissas = random.uniform(1, 10, 20_000)
@@ -52,7 +52,7 @@ def test_numbers_of_all_sizes_ties_and_what_rounds_to_a_power_of_ten(form: str) 
 
 
 @given(numbers=st.lists(st.integers(-3, 2**40), min_size=1, max_size=40))
-def test_any_whole_number(numbers: list[int]) -> None:
+def test_any_whole_number(numbers):
     rows = np.array(numbers)[:, None].repeat(3, axis=1)
     form = "f %d//%d %d\n"
     assert b"".join(rows_text(form, rows)) == by_printf(form, rows)

@@ -16,7 +16,7 @@ POSITIONS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 1\nv 3 3 3\n"
 CORNERS = [[float(word) for word in line.split()[1:]] for line in POSITIONS.splitlines()]
 
 
-def triangles(text: str | bytes) -> list[list[int]]:
+def triangles(text):
     """Return the triangles of a file, by the lines of POSITIONS that their corners are."""
     mesh = formats.read(text if isinstance(text, bytes) else text.encode(), "obj")
     return [

@@ -210,6 +210,7 @@ def test_morph_targets_stay_uncompressed_under_draco_and_are_named():
     assert "extensionsUsed" not in after
     assert {
         "pointer": "/meshes/0/primitives/0",
+        "code": "not-draco",
         "what": "not compressed: Draco cannot hold it",
         "count": 1,
     } in result.report["changes"]
