@@ -35,8 +35,9 @@ class Choice(Sharp):
     """Options of one refinement.
 
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
-    ``uv_keep`` is what stays linear of UV maps. ``tolerance`` (as of ``pns_common.refine``) or
-    ``max_faces`` make faces only where the surface bends, and ``levels`` has no effect.
+    ``uv_keep`` is what stays linear of UV maps. ``tolerance``, ``angle``
+    or ``max_faces`` (as of ``pns_common.refine``) make faces only where the surface bends, and
+    ``levels`` has no effect.
     """
 
     model: Model | None
@@ -45,12 +46,13 @@ class Choice(Sharp):
     limit: bool = True
     uv_keep: Linear = "boundaries"
     tolerance: str | None = None
+    angle: float | None = None
     max_faces: int | None = None
 
     @property
     def goals(self) -> dict[str, Any]:
         """Goals of faces of several levels, as arguments of the library's refine."""
-        given = {"tolerance": self.tolerance, "max_faces": self.max_faces}
+        given = {name: getattr(self, name) for name in ("tolerance", "angle", "max_faces")}
         return {name: goal for name, goal in given.items() if goal is not None}
 
 
