@@ -188,13 +188,11 @@ def _refine_to_goal(
     threads: int | None,
     progress: Callable[[int, int], None] | None,
 ) -> Refinement:
-    """Refine a mesh of triangles until a goal is reached; arguments as of ``refine``."""
+    """Refine a mesh until a goal is reached; arguments as of ``refine``."""
+    from pns_common.adaptive.polygon_refinement import refine_polygons
     from pns_common.adaptive.refine import goal_of, refine_to_goal
 
     given = "a tolerance, max_faces or max_edge_length"
-    if scheme.base.polygons:
-        expected = f"loop or pns on triangles with {given}: polygons are refined by whole levels"
-        raise ParameterError("scheme", scheme.name, expected=expected)
     if scheme.rule is not None and scheme.learned_levels != 1:
         expected = f"a model that acts at the first level alone with {given}"
         raise ParameterError("scheme", str(scheme.model), expected=expected)
@@ -217,8 +215,12 @@ def _refine_to_goal(
         if progress is not None:
             progress(0, max(count, 1))
 
-    first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
-    made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
+    if scheme.base.polygons:
+        first = _step(level, scheme, 0)
+        made = refine_polygons(level, first, scheme, kept, goal, deepest, tell)
+    else:
+        first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
+        made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
     if progress is not None:
         progress(made.mesh.face_count, made.mesh.face_count)
     return made

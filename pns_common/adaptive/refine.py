@@ -252,19 +252,38 @@ def refine_to_goal(
         deepest: the most levels that may be used.
         tell: called with numbers of faces, at each level of each attempt.
     """
+    start = start_of(Start, level, first, scheme, creases, goal, deepest, tell)
+    return _written(tree_of(start), level, first, scheme, start.levels, goal)
+
+
+def start_of(
+    kind: type[Start],
+    level: Level,
+    first: Step | None,
+    scheme: Scheme,
+    creases: Creases,
+    goal: Goal,
+    deepest: int,
+    tell: Callable[[int], None],
+) -> Start:
+    """Return the start of trees; arguments as of ``refine_to_goal``."""
     mesh = level.topology
     levels = Levels(scheme.base, level.blocks.quiet(), deepest, creases.levels)
     numbers, faces = np.arange(len(level.points)), np.arange(mesh.face_count)
     control = Part(0, mesh, level.points, numbers, faces, np.ones(len(faces), dtype=bool))
-    start = Start(control, None, levels, goal, tell)
+    start = kind(control, None, levels, goal, tell)
     if first is not None:
         every = np.arange(len(first.points))
         topology = scheme.base.split(mesh, levels.blocks, inherit=levels.inherit(1))
-        codes, there = np.arange(CHILDREN * len(faces)), np.ones(CHILDREN * len(faces), dtype=bool)
-        finer = Part(1, topology, first.points, every, codes, there)
+        codes = np.arange(topology.face_count)
+        finer = Part(1, topology, first.points, every, codes, np.ones(len(codes), dtype=bool))
         start = replace(start, first=(finer, Refined(numbers, mesh, every)))
-    tree = _with_so_many(start) if goal.max_faces is not None else _near_enough(start)
-    return _written(tree, level, first, scheme, levels, goal)
+    return start
+
+
+def tree_of(start: Start) -> Tree:
+    """Return the tree that reaches the goal of a start."""
+    return _near_enough(start) if start.goal.max_faces is None else _with_so_many(start)
 
 
 def _near_enough(start: Start) -> Tree:
@@ -324,19 +343,17 @@ def _largest_left(tree: Tree, deepest: int) -> float:
 def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
     """Return depth and row of split faces, those of the largest errors first, by place if equal."""
     errors, above = [layer.errors.copy() for layer in tree.layers], list[np.ndarray]()
-    for finer, coarser, of_finer, of_coarser in zip(
-        tree.layers[:0:-1], tree.layers[-2::-1], errors[:0:-1], errors[-2::-1], strict=True
-    ):
+    for depth in range(len(errors) - 1, 0, -1):
         # A face is not better than its children, so that none comes before its parent.
-        rows = np.flatnonzero(finer.part.exists)
-        parents = np.searchsorted(coarser.part.codes, finer.part.codes[rows] // CHILDREN)
-        np.maximum.at(of_coarser, parents, of_finer[rows])
+        part = tree.layers[depth].part
+        rows = np.flatnonzero(part.exists)
+        np.maximum.at(errors[depth - 1], tree.parents(depth, part.codes[rows]), errors[depth][rows])
     at, values, middles = above, list[np.ndarray](), list[np.ndarray]()
     for depth, layer in enumerate(tree.layers):
-        rows, part = np.flatnonzero(layer.split), layer.part
+        rows = np.flatnonzero(layer.split)
         at.append(np.stack([np.full(len(rows), depth), rows], axis=1))
         values.append(errors[depth][rows])
-        middles.append(tree.places[part.names[part.topology.faces[rows]]].mean(axis=1))
+        middles.append(tree.middles_of(depth, rows))
     places, error = np.concatenate(middles), np.concatenate(values)
     size = np.abs(places).max(initial=0.0) or 1.0
     keys = np.round(places / size, DIGITS)
