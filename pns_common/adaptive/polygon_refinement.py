@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.adaptive.polygons import PolygonStart, PolygonTree
-from pns_common.adaptive.quad_certificate import QUAD, taken
+from pns_common.adaptive.quad_certificate import QUAD, ragged
 from pns_common.adaptive.refine import AdaptiveRefinement, Trail, start_of, tree_of
 from pns_common.adaptive.tree import Goal
 from pns_common.errors import MeshError
@@ -82,6 +82,27 @@ class PolygonRefinement(AdaptiveRefinement):
         weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
         return codes, weights
 
+    @cached_property
+    def nearest_corners(self) -> Integer[np.ndarray, " H"]:
+        """The nearest corner of the control mesh in its quad, of each corner."""
+        return self.quads[0]
+
+    @cached_property
+    def edge_parents(self) -> Integer[np.ndarray, " H"]:
+        """The control edge that the side from each corner on lies on; −1: inside of a face."""
+        mesh, (rows, weights) = self.control.topology, self.quads
+        edges, before = mesh.corner_edges.astype(np.int64), following(mesh.offsets)
+        entering = np.empty_like(edges)
+        entering[before] = edges
+        leaves, enters = weights[:, 2:].sum(axis=1) == 0, weights[:, 1:3].sum(axis=1) == 0
+        own = np.where([leaves, enters], [edges[rows], entering[rows]], -1)
+        other = own[:, following(self.mesh.offsets)]
+        made = np.full(len(rows), -1)
+        for one in own:
+            for two in other:
+                made = np.where((one == two) & (one >= 0), one, made)
+        return made
+
     def at_corners(self, values: Float[np.ndarray, "H K"]) -> Float[np.ndarray, "G K"]:
         """Return values of the control mesh's corners at corners of faces, face after face.
 
@@ -122,7 +143,8 @@ def refine_polygons(
     )
     starts = np.concatenate([[0], np.cumsum(counts)])
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
-    (names, offsets), (at, _) = taken(names, starts, order), taken(at, starts, order)
+    places, offsets = ragged(starts, order)
+    names, at = names[places], at[places]
     used = marked(names, len(tree.places))
     used[: len(level.points)] = True
     rows, number = np.flatnonzero(used), np.cumsum(used) - 1

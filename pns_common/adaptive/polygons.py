@@ -25,7 +25,7 @@ from pns_common.adaptive.quad_certificate import (
     lines,
     near_enough,
     planes,
-    taken,
+    ragged,
 )
 from pns_common.adaptive.tree import Flags, Layer, Measured, Start, Tree
 from pns_common.kernels import connectivity
@@ -62,7 +62,7 @@ class PolygonTree(Tree):
         """Return faces of a level, which are not split, with the new vertices on their sides."""
         layer = self.layers[depth]
         mesh = layer.part.topology
-        corners, offsets = taken(np.arange(len(mesh.corners)), mesh.offsets, rows)
+        corners, offsets = ragged(mesh.offsets, rows)
         after = following(mesh.offsets)[corners]
         first = np.repeat(offsets[:-1], np.diff(offsets))
         own, at = [np.arange(len(corners))], [np.arange(len(corners)) - first + 0.0]
@@ -169,8 +169,10 @@ class PolygonTree(Tree):
 
     def written(self, depth: int, split: Flags) -> Written:
         """Return the faces of a level that are not split, cut where they have new vertices."""
-        layer = self.layers[depth]
-        there = np.flatnonzero(layer.part.exists & ~split[depth])
+        layer, there = self.layers[depth], ~split[depth]
+        if depth:
+            there &= split[depth - 1][self.parents(depth, layer.part.codes)]
+        there = np.flatnonzero(there)
         given = self.outlines(split, depth, there)
         distance = self.distances(depth, there, given)
         degree = np.diff(layer.part.topology.offsets)[there]
@@ -182,10 +184,9 @@ class PolygonTree(Tree):
         bits = np.where(half == 1 / 2, 1 << np.minimum(given.at, 60).astype(np.int64), 0)
         kind = np.where(fits, np.add.reduceat(bits, given.offsets[:-1]), -1)
         whole = ~fits | (kind == 0)
-        made = list[tuple[np.ndarray, np.ndarray, np.ndarray]]()
-        names, offsets = taken(given.names, given.offsets, np.flatnonzero(whole))
-        at, _ = taken(given.at, given.offsets, np.flatnonzero(whole))
-        pieces = [(np.flatnonzero(whole), names, at, np.diff(offsets))]
+        rows = np.flatnonzero(~fits | (kind == 0))
+        places, offsets = ragged(given.offsets, rows)
+        pieces = [(rows, places, np.diff(offsets))]
         for n in (TRIANGLE, QUAD):
             for pattern in range(1, 2**n - (n == QUAD)):
                 rows = np.flatnonzero((kind == pattern) & (degree == n))
@@ -193,22 +194,14 @@ class PolygonTree(Tree):
                     continue
                 table, counts = cut(n, pattern)
                 first = given.offsets[rows][:, None] + table
-                pieces.append(
-                    (
-                        np.repeat(rows, len(counts)),
-                        given.names[first].reshape(-1),
-                        given.at[first].reshape(-1),
-                        np.tile(counts, len(rows)),
-                    )
-                )
-        own, names, at, counts = (np.concatenate(each) for each in zip(*pieces, strict=True))
+                every = np.repeat(rows, len(counts)), np.tile(counts, len(rows))
+                pieces.append((every[0], first.reshape(-1), every[1]))
+        own, places, counts = (np.concatenate(each) for each in zip(*pieces, strict=True))
         order = np.argsort(own, kind="stable")
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        names, _ = taken(names, starts, order)
-        at, _ = taken(at, starts, order)
-        own = own[order]
+        moved, _ = ragged(np.concatenate([[0], np.cumsum(counts)]), order)
+        places, own = places[moved], own[order]
         codes = layer.part.codes[there[own]]
-        return Written(names, at, counts[order], distance[own], codes)
+        return Written(given.names[places], given.at[places], counts[order], distance[own], codes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +271,7 @@ class PolygonStart(Start):
     def _measured(
         self,
         part: Part,
-        places: Float[np.ndarray, "N 3"],
+        places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         known: Measured | None,
     ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
@@ -306,7 +299,7 @@ class PolygonStart(Start):
     def _side_distances(
         self,
         part: Part,
-        places: Float[np.ndarray, "N 3"],
+        places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         rows: Integer[np.ndarray, " N"],
         flat: Float[np.ndarray, " N"],

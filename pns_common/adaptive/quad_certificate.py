@@ -58,8 +58,8 @@ class Patches:
 
     def later(self, some: Integer[np.ndarray, " K"], levels: Levels) -> Patches:
         """Return some of them a level later."""
-        rows, offsets = taken(self.rows, self.offsets, some)
-        part, first = _split(self.part, rows, levels)
+        places, offsets = ragged(self.offsets, some)
+        part, first = _split(self.part, self.rows[places], levels)
         return Patches(part, _children(first), CHILDREN * offsets, inside=True)
 
 
@@ -121,16 +121,13 @@ def near_enough(
     return made
 
 
-def taken(
-    values: Integer[np.ndarray, " M"],
-    offsets: Integer[np.ndarray, " N1"],
-    rows: Integer[np.ndarray, " K"],
-) -> tuple[Integer[np.ndarray, " L"], Integer[np.ndarray, " K1"]]:
-    """Return some rows of ragged rows, and where each begins."""
+def ragged(
+    offsets: Integer[np.ndarray, " N1"], rows: Integer[np.ndarray, " K"]
+) -> tuple[Integer[np.ndarray, " M"], Integer[np.ndarray, " K1"]]:
+    """Return the places of some rows of ragged rows, and where each then begins."""
     counts = np.diff(offsets)[rows]
     made = np.concatenate([[0], np.cumsum(counts)])
-    at = np.repeat(offsets[rows] - made[:-1], counts) + np.arange(made[-1])
-    return values[at], made
+    return np.repeat(offsets[rows] - made[:-1], counts) + np.arange(made[-1]), made
 
 
 def planes(

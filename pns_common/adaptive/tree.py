@@ -50,7 +50,7 @@ class Goal:
     max_faces: int | None = None
 
     def errors(
-        self, distance: Float[np.ndarray, " N"], triangles: Float[np.ndarray, "N 3 3"]
+        self, distance: Float[np.ndarray, " N"], triangles: Float[np.ndarray, "N K 3"]
     ) -> Float[np.ndarray, " N"]:
         """Return the errors of faces: above 1 where they are to be split.
 

@@ -62,7 +62,7 @@ def refine_mesh_file(
         options = replace(options, normals="smooth" if smooth else "keep")
     try:
         if scheme.base.polygons:
-            made = refine_polygons(grouped, scheme, options, stages, traced=traced)
+            made = refine_polygons(grouped, scheme, options, limits, stages, traced=traced)
         else:
             made = _refine_triangles(grouped, scheme, options, limits, stages, traced=traced)
     except MeshError as error:
