@@ -73,7 +73,7 @@ def refine(
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         tolerance: split faces that may be farther from the limit surface, alone; in the mesh's
             units, or a share of the diagonal of its box, as "0.1%". The result is an
-            ``AdaptiveRefinement``: faces of several levels, which meet without gaps. For triangles.
+            ``AdaptiveRefinement``: faces of several levels, which meet without gaps.
         max_faces: split the faces of the largest distance first, and end before there are more.
         max_edge_length: split faces with longer sides; as ``tolerance``.
         limit: put the last level's vertices where the base scheme would take them if it were

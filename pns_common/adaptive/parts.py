@@ -186,8 +186,8 @@ class Levels:
         kept = np.arange(mesh.vertex_count)
         kept[far[spokes]] = mesh.vertex_count + spokes
         if not mesh.triangles:  # the opposite corners, which come last, go to the quads' middles
-            kept[-mesh.face_count :] = mesh.vertex_count + len(mesh.edges) + np.arange(
-                mesh.face_count
+            kept[-mesh.face_count :] = (
+                mesh.vertex_count + len(mesh.edges) + np.arange(mesh.face_count)
             )
         for depth in range(part.depth, self.deepest):
             steps.append(Refined(every, mesh, kept))
@@ -227,7 +227,7 @@ def rows_of_faces(mesh: Topology, of_corners: Integer[np.ndarray, " H"]) -> np.n
 def _built(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Topology:
     if faces.shape[1] == TRIANGLE:
         return build_topology(faces, vertex_count)
-    offsets = np.arange(0, faces.size + 1, faces.shape[1])
+    offsets = faces.shape[1] * np.arange(len(faces) + 1)
     return build_topology((faces.reshape(-1), offsets), vertex_count)
 
 

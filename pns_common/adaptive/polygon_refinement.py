@@ -49,14 +49,14 @@ class PolygonRefinement(AdaptiveRefinement):
         made[deeper] = self.control.topology.face_of(corners[deeper])
         return made
 
-    @property
+    @cached_property
     def weights(self) -> Float[np.ndarray, "F 3 3"]:
         """Raise: a polygon's corners may be made of any number of corners."""
         raise MeshError("polygons have places in quads: use quads or at_corners", element="faces")
 
     @cached_property
     def quads(self) -> tuple[Integer[np.ndarray, " H"], Float[np.ndarray, "H 4"]]:
-        """Where each corner is: in which quad of the first level, with weights of its corners.
+        """The quad of the first level that each corner is in, and weights of its corners there.
 
         The quad of the control mesh's corner h has h, the middle of the side that leaves it, that
         of its face, and the middle of the side that enters it. Weights are whole multiples of
@@ -134,7 +134,10 @@ def refine_polygons(
     assert isinstance(tree, PolygonTree)
     made = [tree.written(depth, tree.split) for depth in range(len(tree.layers))]
     # In the order of control faces, and of children in each.
-    begins = [level.topology.offsets[made[0].codes].astype(np.int64), *(own.codes for own in made[1:])]
+    begins = [
+        level.topology.offsets[made[0].codes].astype(np.int64),
+        *(own.codes for own in made[1:]),
+    ]
     keys = [own * 4 ** (deepest - max(depth, 1)) for depth, own in enumerate(begins)]
     order = np.argsort(np.concatenate(keys), kind="stable")
     names, at, counts, distances, codes = (

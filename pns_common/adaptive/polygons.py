@@ -56,9 +56,7 @@ class Outlines:
 class PolygonTree(Tree):
     """A tree whose faces are polygons, and quads from the first level on."""
 
-    def outlines(
-        self, split: Flags, depth: int, rows: Integer[np.ndarray, " N"]
-    ) -> Outlines:
+    def outlines(self, split: Flags, depth: int, rows: Integer[np.ndarray, " N"]) -> Outlines:
         """Return faces of a level, which are not split, with the new vertices on their sides."""
         layer = self.layers[depth]
         mesh = layer.part.topology
@@ -152,9 +150,7 @@ class PolygonTree(Tree):
         """Return the middles of faces."""
         return self.frames(depth, rows)[:, :3]
 
-    def parents(
-        self, depth: int, codes: Integer[np.ndarray, " N"]
-    ) -> Integer[np.ndarray, " N"]:
+    def parents(self, depth: int, codes: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
         """Return the rows of parents in the level before."""
         above = self.layers[depth - 1].part
         if depth == 1:
@@ -163,9 +159,7 @@ class PolygonTree(Tree):
 
     def count(self, split: Flags) -> int:
         """Return how many faces are written, of flags that are ``closed``."""
-        return sum(
-            len(self.written(depth, split).counts) for depth in range(len(self.layers))
-        )
+        return sum(len(self.written(depth, split).counts) for depth in range(len(self.layers)))
 
     def written(self, depth: int, split: Flags) -> Written:
         """Return the faces of a level that are not split, cut where they have new vertices."""
@@ -183,7 +177,6 @@ class PolygonTree(Tree):
         fits &= corner_count < 2 * QUAD
         bits = np.where(half == 1 / 2, 1 << np.minimum(given.at, 60).astype(np.int64), 0)
         kind = np.where(fits, np.add.reduceat(bits, given.offsets[:-1]), -1)
-        whole = ~fits | (kind == 0)
         rows = np.flatnonzero(~fits | (kind == 0))
         places, offsets = ragged(given.offsets, rows)
         pieces = [(rows, places, np.diff(offsets))]
@@ -229,7 +222,7 @@ def cut(n: int, pattern: int) -> tuple[Integer[np.ndarray, " M"], Integer[np.nda
     between two of these are cut off, and what is left of quads is cut as far as to triangles and
     quads.
     """
-    outline, middles = list[int](), list[bool]()
+    outline = list[int]()
     for side in range(n):
         outline += [side, n + side] if pattern >> side & 1 else [side]
     cut_off = [k for k in range(n) if pattern >> k & 1 and pattern >> (k - 1) % n & 1]
@@ -308,7 +301,7 @@ class PolygonStart(Start):
     ) -> Float[np.ndarray, " N"]:
         """Return how far sides can be from their curves, beyond which no slab bounds these."""
         mesh, distance = part.topology, np.zeros(part.topology.face_count)
-        rim = (mesh.edge_class == connectivity.BOUNDARY)
+        rim = mesh.edge_class == connectivity.BOUNDARY
         rim |= mesh.edge_class == connectivity.IRREGULAR
         turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
         asked = (rim | turned)[mesh.corner_edges]
@@ -355,12 +348,11 @@ def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " 
     return marked(mesh.corner_edges[own], len(mesh.edges))
 
 
-def _edges_between(
-    part: Part, ends: Integer[np.ndarray, "2 N"]
-) -> Integer[np.ndarray, " N"]:
+def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.ndarray, " N"]:
     """Return the edges of a part between named vertices; −1 where there is none."""
     names = np.sort(part.names[part.topology.edges.astype(np.int64)], axis=1)
-    wanted, size = np.sort(ends, axis=0), max(int(names.max(initial=0)), int(ends.max())) + 1
+    wanted = np.sort(ends, axis=0)
+    size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
     keys, asked = names[:, 0] * size + names[:, 1], wanted[0] * size + wanted[1]
     order = np.argsort(keys, kind="stable")
     at = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]

@@ -102,7 +102,7 @@ def near_enough(
     levels: Levels,
     enough: float,
     steps: int,
-) -> Float[np.ndarray, "N *B"]:
+) -> Float[np.ndarray, " N *B"]:
     """Return bounds of patches or sides; those below ``enough`` need not be exact."""
     made = given.bounds(frames, levels)
     worst = np.abs(made).reshape(len(made), -1).max(axis=1, initial=0.0)
@@ -126,8 +126,9 @@ def ragged(
 ) -> tuple[Integer[np.ndarray, " M"], Integer[np.ndarray, " K1"]]:
     """Return the places of some rows of ragged rows, and where each then begins."""
     counts = np.diff(offsets)[rows]
-    made = np.concatenate([[0], np.cumsum(counts)])
-    return np.repeat(offsets[rows] - made[:-1], counts) + np.arange(made[-1]), made
+    made = np.append(0, np.cumsum(counts))
+    at: Integer[np.ndarray, " M"] = np.repeat(offsets[rows] - made[:-1], counts)
+    return at + np.arange(int(made[-1])), made
 
 
 def planes(
@@ -157,9 +158,7 @@ def lines(
 def _lasts(part: Part, levels: Levels) -> bool:
     """Return whether rules are known one level later."""
     mesh = part.topology
-    wears = any(
-        (np.isfinite(of) & (of > 0)).any() for of in (mesh.wear, mesh.vertex_sharpness)
-    )
+    wears = any((np.isfinite(of) & (of > 0)).any() for of in (mesh.wear, mesh.vertex_sharpness))
     return not wears or part.depth < levels.deepest
 
 

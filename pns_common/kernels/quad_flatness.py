@@ -7,15 +7,25 @@ o at others on this side, and b beyond is at most
 
     i / 2 + (1/2 − δ) max(i, o) + δ max(i, o, b)      δ = min(1 − w, 1/2)
 
-and the like from below. On a sharp curve the same holds of both ends, others along it, and the rest.
+and the like from below. On a sharp curve that holds of both ends, others along it, and the rest.
 """
 
 from __future__ import annotations
 
 import math
 
-from pns_common.kernels import f8_1d, f8_2d, i1_1d, i4_1d, i4_2d, i8_1d, inlined, kernel, u4_1d, u4_2d
-from pns_common.kernels.connectivity import BOUNDARY, IRREGULAR
+from pns_common.kernels import (
+    f8_1d,
+    f8_2d,
+    i1_1d,
+    i4_2d,
+    i8_1d,
+    i8_2d,
+    inlined,
+    kernel,
+    u4_1d,
+    u4_2d,
+)
 from pns_common.kernels.flatness import HALF, across, blended
 from pns_common.kernels.vectors import difference, dot, norm, row
 

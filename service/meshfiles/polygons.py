@@ -340,10 +340,7 @@ def _at_faces(
     values: np.ndarray, bare: Bool[np.ndarray, " F"], made: PolygonRefinement, *, whole: bool
 ) -> Layer:
     """Return values at corners of faces of several levels; ``bare`` faces have none."""
-    if whole:
-        own = values[made.nearest_corners]
-    else:
-        own = in_type_of(values, made.at_corners(values))
+    own = values[made.nearest_corners] if whole else in_type_of(values, made.at_corners(values))
     # Corners of one vertex with one value stay one.
     words = np.column_stack([as_words(made.mesh.corners[:, None]), as_words(own)])
     number, first = number_by_first_appearance(distinct_rows(words))

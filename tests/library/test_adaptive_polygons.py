@@ -1,5 +1,7 @@
 """Polygons with a goal: near enough to the limit surface, no gaps, no matter of numbering."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -9,6 +11,7 @@ from pns_common.adaptive.polygons import cut
 from pns_common.carry.carried import Carried, Column, refine_carried
 from pns_common.carry.rules import linear
 from pns_common.mesh.topology import EdgeClass
+from pns_common.parallel import Blocks
 from tests.support.meshes import bent, bumpy_sphere, grid, rotation, three_pages
 from tests.support.polygons import (
     CUBE,
@@ -33,17 +36,13 @@ def shaken(made, by=0.1, seed=0):
     return uneven(points, seed, by), faces
 
 
-def bow_tie_of_quads():
+def two_cubes():
     """Two cubes that share one vertex only."""
     faces = np.array(CUBE_FACES)
-    other = np.where(faces == 0, 7, faces + 7)
-    points = np.concatenate([CUBE, CUBE[1:] * [-1, -1, 0.6]])
-    return points + [0, 0, 1], np.concatenate([faces, np.where(faces == 0, 0, faces + 7)]), other
-
-
-def two_cubes():
-    points, faces, _ = bow_tie_of_quads()
-    return points, faces
+    points = np.concatenate([CUBE, CUBE[1:] * [-1, -1, -0.6]])
+    # The second one is a mirror image: its faces are turned over.
+    other = np.where(faces == 0, 0, faces + 7)[:, ::-1]
+    return points, np.concatenate([faces, other])
 
 
 SHAPES = {
@@ -141,7 +140,7 @@ def test_faces_of_different_levels_meet_without_gaps(name, scheme, goal):
 
 
 def along_side(h, weights, control):
-    """Return the edges of the control mesh that a corner lies on, and how far from the lower end."""
+    """Return the control edges that a corner lies on, and how far from the lower end."""
     [face] = control.face_of(np.array([h]))
     begin, end = control.offsets[face], control.offsets[face + 1]
     before = h - 1 if h > begin else end - 1
@@ -164,7 +163,9 @@ def test_no_point_of_the_limit_surface_is_farther_than_said(name, marked, tolera
     mesh = shape(name)
     creases = MARKED[marked](mesh)
     made = refine(mesh, learned(mesh), LEVELS, tolerance=tolerance, creases=creases)
-    dense = refine(mesh, learned(mesh), LEVELS + 1, creases=creases).mesh if marked != "wears" else None
+    dense = (
+        refine(mesh, learned(mesh), LEVELS + 1, creases=creases).mesh if marked != "wears" else None
+    )
     if dense is None:  # what wears off does so down to the deepest level
         dense = refine(mesh, learned(mesh), LEVELS, creases=creases).mesh
     levels = LEVELS + (marked != "wears")
@@ -211,8 +212,8 @@ def over(face, points, normal):
     found = [np.zeros(0)]
     for first in range(len(face) if len(face) < 5 else 1):
         fan = np.roll(face, -first, axis=0)
-        for b, c in zip(fan[1:-1], fan[2:], strict=True):
-            a = fan[0]
+        a = fan[0]
+        for b, c in pairwise(fan[1:]):
             frame = np.column_stack([b - a, c - a, normal / size])
             if abs(np.linalg.det(frame)) < 1e-12 * size:
                 continue
@@ -264,6 +265,25 @@ def test_a_mirrored_mesh_becomes_the_mirrored_result(name, scheme, goal):
 def test_a_cube_stays_as_it_is():
     made = refine(Mesh(CUBE, CUBE_FACES), "pns", tolerance="0.1%")
     np.testing.assert_array_equal(made.mesh.faces, CUBE_FACES)
+
+
+@pytest.mark.parametrize("name", ["drum", "sheet", "steep sheet", "star of three"])
+@pytest.mark.parametrize("tolerance", ["1%", "0.1%"])
+def test_rims_are_as_near_as_faces_say(name, tolerance):
+    mesh = shape(name)
+    made = refine(mesh, "catmull-clark", tolerance=tolerance, creases="angle:80")
+    dense = refine(mesh, "catmull-clark", 5, creases="angle:80")
+    last = dense.scheme.base.split(dense.topologies[-1], Blocks())
+    curve = dense.mesh.vertices[np.unique(last.edges[last.edge_class != EdgeClass.INTERIOR])]
+    sharp = made.control.topology.edge_class != EdgeClass.INTERIOR
+    sides = made.mesh.topology()
+    on = (made.edge_parents >= 0) & sharp[made.edge_parents]
+    ends = made.mesh.vertices[sides.edges[np.unique(sides.corner_edges[on])].astype(np.int64)]
+    a, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    share = ((curve[:, None] - a) * along).sum(axis=2) / (along**2).sum(axis=1)
+    away = curve[:, None] - a - np.clip(share, 0, 1)[:, :, None] * along
+    farthest = np.linalg.norm(away, axis=2).min(axis=1).max()
+    assert 0 < farthest <= made.distances.max() <= made.goal.tolerance
 
 
 def test_a_drum_keeps_its_lids():
