@@ -13,10 +13,9 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh.creases import Creases, chosen_creases, one_of_creases
 from pns_common.mesh.mesh import Mesh, check_is_mesh
-from pns_common.mesh.quads import QUAD
 from pns_common.mesh.reference_length import measure_reference_length
 from pns_common.mesh.selection import chosen_faces, select
-from pns_common.mesh.topology import TRIANGLE
+from pns_common.mesh.topology import QUAD, TRIANGLE
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import NAMES, Scheme, named_scheme
 from pns_common.operator.sharpness import with_sharp_edges
@@ -46,6 +45,7 @@ def refine(
     reference_length: float | str = "auto",
     *,
     tolerance: float | str | None = None,
+    angle: float | None = None,
     max_faces: int | None = None,
     max_edge_length: float | str | None = None,
     limit: bool = True,
@@ -66,14 +66,17 @@ def refine(
             "catmull-clark" or "pns", the default model. The default model refines triangles by
             Loop's scheme; a mesh with other faces goes to its companion over Catmull–Clark.
         levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
-            None: 2, or with a tolerance or one of the next two 6, of which each face takes as many
-            as it needs.
+            None: 2, or with a tolerance or one of the next three 6, of which each face takes as
+            many as it needs.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         tolerance: split faces that may be farther from the limit surface, alone; in the mesh's
             units, or a share of the diagonal of its box, as "0.1%". The result is an
             ``AdaptiveRefinement``: faces of several levels, which meet without gaps.
+        angle: split faces over which shading turns by more degrees: between the normals of the
+            limit surface at their corners and where the next level has vertices on their sides.
+            For triangles.
         max_faces: split the faces of the largest distance first, and end before there are more.
         max_edge_length: split faces with longer sides; as ``tolerance``.
         limit: put the last level's vertices where the base scheme would take them if it were
@@ -106,13 +109,14 @@ def refine(
     """
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
-    if not (tolerance is None and max_faces is None and max_edge_length is None):
+    goals = tolerance, angle, max_faces, max_edge_length
+    if any(goal is not None for goal in goals):
         return _refine_to_goal(
             mesh,
             scheme,
             levels,
             reference_length,
-            (tolerance, max_faces, max_edge_length),
+            goals,
             limit=limit,
             creases=one_of_creases(creases, crease),
             border=border,
@@ -179,7 +183,7 @@ def _refine_to_goal(
     scheme: Scheme,
     levels: SupportsIndex | None,
     reference_length: float | str,
-    goals: tuple[Any, Any, Any],
+    goals: tuple[Any, Any, Any, Any],
     *,
     limit: bool,
     creases: Integer[np.ndarray, "N 2"] | Creases | str | None,
@@ -192,7 +196,9 @@ def _refine_to_goal(
     from pns_common.adaptive.polygon_refinement import refine_polygons
     from pns_common.adaptive.refine import goal_of, refine_to_goal
 
-    given = "a tolerance, max_faces or max_edge_length"
+    given = "a tolerance, angle, max_faces or max_edge_length"
+    if scheme.base.polygons and goals[1] is not None:
+        raise ParameterError("angle", goals[1], expected=f"None: {scheme.base.name} has no angles")
     if scheme.rule is not None and scheme.learned_levels != 1:
         expected = f"a model that acts at the first level alone with {given}"
         raise ParameterError("scheme", str(scheme.model), expected=expected)

@@ -168,6 +168,7 @@ def refine_polygons(
         halves=np.zeros(len(order), dtype=np.int8),
         face_levels=depths,
         distances=distances[order],
+        angles=np.zeros(len(order)),
         goal=goal,
         trail=Trail(
             [layer.step for layer in tree.layers if layer.step is not None],

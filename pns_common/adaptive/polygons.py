@@ -267,7 +267,7 @@ class PolygonStart(Start):
         places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         known: Measured | None,
-    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
+    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]:
         mesh, enough = part.topology, self.goal.tolerance or 0.0
         count, steps = mesh.face_count, DEEPER - (finer is not None)
         errors, slabs, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
@@ -286,8 +286,9 @@ class PolygonStart(Start):
         )
         slabs[rows, SIDE] = self._side_distances(part, places, finer, rows, flat, frames, steps)
         distance = np.maximum(flat, slabs[rows, SIDE])
-        errors[rows] = self.goal.errors(distance, points)
-        return errors, slabs
+        turns = np.zeros(count)
+        errors[rows] = self.goal.errors(distance, turns[rows], points)
+        return errors, slabs, turns
 
     def _side_distances(
         self,

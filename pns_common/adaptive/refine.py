@@ -24,6 +24,7 @@ from pns_common.adaptive.tree import (
     edges_of,
     sides_of,
 )
+from pns_common.adaptive.turning import degrees
 from pns_common.errors import MeshError, ParameterError
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh
@@ -151,6 +152,8 @@ class AdaptiveRefinement(Refinement):
         face_levels: (F,) how often each face's parent was split.
         distances: (F,) no point of the part of the limit surface that a face stands for is farther
             from its plane, in the mesh's units; at sharp edges none from the edge.
+        angles: (F,) how far shading turns over each face, in degrees; 0 where no angle was asked
+            for.
         goal: what was asked for.
         trail: how values of control vertices become those of refined ones.
         control: the control mesh with its sharp edges.
@@ -160,6 +163,7 @@ class AdaptiveRefinement(Refinement):
     halves: Integer[np.ndarray, " F"] = field(repr=False)
     face_levels: Integer[np.ndarray, " F"] = field(repr=False)
     distances: Float[np.ndarray, " F"] = field(repr=False)
+    angles: Float[np.ndarray, " F"] = field(repr=False)
     goal: Goal
     trail: Trail = field(repr=False)
     control: Level = field(repr=False)
@@ -223,12 +227,16 @@ class AdaptiveRefinement(Refinement):
             **self._report_of(learned, self.control.topology),
             "adaptive": {
                 "tolerance": self.goal.tolerance,
+                "angle": self.goal.angle,
                 "max_edge_length": self.goal.max_edge_length,
                 "max_faces": self.goal.max_faces,
                 "vertices": len(self.mesh.vertices),
                 "faces": self.mesh.face_count,
                 "faces_by_level": levels.tolist(),
                 "distance_max": float(self.distances.max(initial=0.0)),
+                "angle_max": None
+                if self.goal.angle is None
+                else float(self.angles.max(initial=0.0)),
             },
         }
 
@@ -389,9 +397,9 @@ def _written(
     made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
     keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    names, halves, distance, codes = (
+    names, halves, distance, turned, codes = (
         np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("names", "halves", "distances", "codes")
+        for name in ("names", "halves", "distances", "turns", "codes")
     )
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
@@ -417,6 +425,7 @@ def _written(
         halves=halves,
         face_levels=depths,
         distances=distance,
+        angles=degrees(turned),
         goal=goal,
         trail=Trail(steps, settled, rows, levels),
         control=level,
@@ -425,11 +434,12 @@ def _written(
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Faces of one level: names of corners, halves, distances, codes."""
+    """Faces of one level: names of corners, halves, distances, turns, codes."""
 
     names: Integer[np.ndarray, "F 3"]
     halves: Integer[np.ndarray, " F"]
     distances: Float[np.ndarray, " F"]
+    turns: Float[np.ndarray, " F"]
     codes: Integer[np.ndarray, " F"]
 
 
@@ -452,23 +462,27 @@ def _faces_of(tree: Tree, depth: int) -> _Faces:
     names, halves = names[at], halves[at]
     names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
     halves[firsts], halves[firsts + 1] = 2 * side + 1, 2 * side + 2
-    return _Faces(names, halves, distance[at], codes[at])
+    return _Faces(names, halves, distance[at], layer.turns[rows[at]], codes[at])
 
 
 # --- arguments ------------------------------------------------------------------------------------
 
 
-def goal_of(mesh: Mesh, tolerance: Any, max_faces: Any, max_edge_length: Any) -> Goal:
+def goal_of(mesh: Mesh, tolerance: Any, angle: Any, max_faces: Any, max_edge_length: Any) -> Goal:
     """Return what a refinement is to reach.
 
     Raises:
-        ParameterError: a length that is not above 0, or fewer faces than the mesh has.
+        ParameterError: a length or an angle that is not above 0, an angle of 180 degrees or more,
+            or fewer faces than the mesh has.
     """
     if max_faces is not None and not (is_whole(max_faces) and max_faces >= mesh.face_count):
         expected = f"a whole number, at least {mesh.face_count}: faces are split, never joined"
         raise ParameterError("max_faces", max_faces, expected=expected)
+    if angle is not None and not (is_number(angle) and 0 < float(angle) < 180):
+        raise ParameterError("angle", angle, expected="degrees, above 0 and below 180")
     return Goal(
         _length(mesh, "tolerance", tolerance),
+        None if angle is None else float(angle),
         _length(mesh, "max_edge_length", max_edge_length),
         None if max_faces is None else int(max_faces),
     )

@@ -25,6 +25,7 @@ from pns_common.adaptive.parts import (
     Settled,
     rows_of_faces,
 )
+from pns_common.adaptive.turning import chord, turns
 from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
 from pns_common.mesh.topology import Topology
@@ -41,16 +42,21 @@ class Goal:
 
     Attributes:
         tolerance: no face is to be farther from the limit surface.
+        angle: normals of no face are to turn more, in degrees.
         max_edge_length: no edge is to be longer.
         max_faces: so many faces at most, those of the largest errors split first.
     """
 
     tolerance: float | None = None
+    angle: float | None = None
     max_edge_length: float | None = None
     max_faces: int | None = None
 
     def errors(
-        self, distance: Float[np.ndarray, " N"], triangles: Float[np.ndarray, "N K 3"]
+        self,
+        distance: Float[np.ndarray, " N"],
+        turns: Float[np.ndarray, " N"],
+        triangles: Float[np.ndarray, "N K 3"],
     ) -> Float[np.ndarray, " N"]:
         """Return the errors of faces: above 1 where they are to be split.
 
@@ -59,6 +65,8 @@ class Goal:
         parts = list[np.ndarray]()
         if self.tolerance is not None:
             parts.append(distance / self.tolerance)
+        if self.angle is not None:
+            parts.append(turns / chord(self.angle))
         if self.max_edge_length is not None:
             sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
             parts.append(sides.max(axis=1) / self.max_edge_length)
@@ -72,7 +80,7 @@ class Layer:
     Attributes:
         part: the faces, and those around them.
         split: (F,) which faces are split.
-        errors, slabs: (F,), (F, 3) of those that exist; 0 elsewhere.
+        errors, slabs, turns: (F,), (F, 3), (F,) of those that exist; 0 elsewhere.
         middles: (E,) the name of the vertex on each edge at the next level, or NOT_THERE.
         step: from this level to the next; None at the last.
         settled: vertices that are in no level before.
@@ -82,6 +90,7 @@ class Layer:
     split: Bool[np.ndarray, " F"]
     errors: Float[np.ndarray, " F"]
     slabs: Float[np.ndarray, "F 3"]
+    turns: Float[np.ndarray, " F"]
     middles: Integer[np.ndarray, " E"]
     step: Refined | None
     settled: Sequence[Settled]
@@ -89,11 +98,12 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Faces of a level that exist: their codes, errors and slabs."""
+    """Faces of a level that exist: their codes, errors, slabs and turns."""
 
     codes: Integer[np.ndarray, " N"]
     errors: Float[np.ndarray, " N"]
     slabs: Float[np.ndarray, "N 3"]
+    turns: Float[np.ndarray, " N"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +131,7 @@ class Tree:
     def measured(self) -> Sequence[Measured]:
         """Measurements of faces, level by level: they take less memory than the tree."""
         return [
-            Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own])
+            Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own], layer.turns[own])
             for layer in self.layers
             for own in [layer.part.exists]
         ]
@@ -251,7 +261,8 @@ class Start:
             else:
                 settled = self._settle(part, places)
             old = known[depth] if depth < len(known) else None
-            errors, slabs = self._measured(part, places, finer, old)
+            measured = self._measured(part, places, finer, old)
+            errors = measured[0]
             split = part.exists & (errors > threshold) & (not only)
             if forced is not None and depth < len(forced):
                 split |= part.exists & np.isin(part.codes, forced[depth])
@@ -265,7 +276,7 @@ class Start:
                     finer, step, middles = self.levels.split(part, split, names)
                     places = _longer(places, len(finer.names) - len(step.vertices))
                 names = len(places)
-            layers.append(Layer(part, split, errors, slabs, middles, step, settled))
+            layers.append(Layer(part, split, *measured, middles, step, settled))
             if finer is None or not split.any():
                 break
             part = finer
@@ -291,30 +302,32 @@ class Start:
         places: Float[np.ndarray, "N 3"],
         finer: Part | None,
         known: Measured | None,
-    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
-        """Return errors and slabs of faces that exist, of those of the next level if it is given.
+    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]:
+        """Return errors, slabs and turns of faces that exist.
 
-        Those that are known are not measured again.
+        They are measured on those of the next level if it is given. Those that are known are not
+        measured again.
         """
-        count = part.topology.face_count
-        errors, made, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
+        count, rows = part.topology.face_count, np.flatnonzero(part.exists)
+        made = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
         if known is not None and len(known.codes):
             codes = part.codes[rows]
             there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
             same = known.codes[there] == codes
-            errors[rows[same]], made[rows[same]] = (
-                known.errors[there][same],
-                known.slabs[there][same],
-            )
+            for own, old in zip(made, (known.errors, known.slabs, known.turns), strict=True):
+                own[rows[same]] = old[there[same]]
             rows = rows[~same]
         if len(rows):
+            errors, widths, turned = made
             triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
             of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
             enough = self.goal.tolerance or 0.0
             asked = triangles, folded(part)[rows], self.levels, int(deeper), enough
-            made[rows] = slabs(finer or part, of_finer, *asked)
-            errors[rows] = self.goal.errors(distances(made[rows]), triangles)
-        return errors, made
+            widths[rows] = slabs(finer or part, of_finer, *asked)
+            if self.goal.angle is not None:
+                turned[rows] = turns(part, finer, rows, self.levels)
+            errors[rows] = self.goal.errors(distances(widths[rows]), turned[rows], triangles)
+        return made
 
 
 def _longer(places: Float[np.ndarray, "N 3"], more: int) -> Float[np.ndarray, "M 3"]:

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int, Shaped, UInt8
 
 from pns_common.mesh.rows import disjoint_faces, unit
 
+from ..changes import Change, counted
 from ..errors import GltfError, UnrefinableError, check_limit
 from ..gltf.constants import FLOAT, OUTLINE, SURFACES, TRIANGLES
 from ..gltf.read.accessors import as_float, read
@@ -23,7 +24,6 @@ from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.skin import read_skin_and_morph
 from ..meshes.weld import weld, weld_by_label
 from ..options import Limits
-from ..report import Change
 from .formats import FORMATS, Format
 from .mesh_file import (
     COLOUR,
@@ -110,14 +110,13 @@ def flatten(
     # A format without normals has named them already.
     room = FORMATS[kind].layers
     turned *= room is None or NORMAL in room
-    for what, count in (
-        ("hidden nodes", len(left & hidden)),
-        ("nodes outside of the default scene", len(left - worlds.keys())),
-        ("normals of skinned meshes", turned),
-    ):
-        if count:
-            changes.append(Change("/nodes", f"{what} left out", count))
-    return mesh_file, changes
+    left_out = {
+        "hidden nodes": len(left & hidden),
+        "nodes outside of the default scene": len(left - worlds.keys()),
+        "normals of skinned meshes": turned,
+    }
+    told = {("left-out", what): count for what, count in left_out.items()}
+    return mesh_file, changes + counted(told, "/nodes")
 
 
 def check_copies(upload: Upload, faces: Mapping[int, int], limits: Limits) -> list[tuple[int, int]]:
@@ -433,28 +432,27 @@ def _shown_colours(tree: dict[str, Any]) -> UInt8[np.ndarray, "M 4"]:
 
 def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:
     """Return what no format of plain meshes is given; what one of them cannot hold, it reports."""
-    why = f": not written to {kind.upper()} files"
+
+    def lost_at(pointer: str, counts: dict[str, int]) -> list[Change]:
+        return counted(
+            {("not-written", what, kind.upper()): counts[what] for what in counts}, pointer
+        )
+
     changes = [
-        Change(f"/{name}", f"{name} dropped{why}", len(tree[name]))
-        for name in LOST
-        if tree.get(name)
+        change for name in LOST for change in lost_at(f"/{name}", {name: len(tree.get(name) or ())})
     ]
     named = "definitions of materials" if MATERIAL in FORMATS[kind].labels else "materials"
-    changes += [
-        Change(pointer, f"{what} dropped{why}", count)
-        for pointer, what, count in (
-            ("/materials", named, len(tree.get("materials", []))),
-            ("/meshes", "morph targets", _count_targets(tree)),
-            ("/meshes", "points and lines", _count_other_modes(tree)),
-            ("/meshes", "outlines", _count_outlines(tree)),
-        )
-        if count
-    ]
+    changes += lost_at("/materials", {named: len(tree.get("materials", []))})
+    of_meshes = {
+        "morph targets": _count_targets(tree),
+        "points and lines": _count_other_modes(tree),
+        "outlines": _count_outlines(tree),
+    }
+    changes += lost_at("/meshes", of_meshes)
     children = _children(tree.get("nodes", []))
-    if again := len(children) - len(set(children)):
-        changes.append(Change("/nodes", "nodes with several parents placed once, by one", again))
-    if placed > 1:
-        changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
+    again = len(children) - len(set(children))
+    told = {"several-parents": again, "nodes-joined": placed if placed > 1 else 0}
+    changes += counted(told, "/nodes")
     form = FORMATS[kind]
     kept = {"POSITION", *((UV, NORMAL, COLOUR) if form.layers is None else form.layers)}
     lost = {
@@ -463,11 +461,8 @@ def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
         for name in own - kept
         if not (form.layers is None and name.startswith("_"))
     }
-    changes += [
-        Change("/meshes", f"attribute {name} dropped{why}", sum(name in own for own in names))
-        for name in sorted(lost)
-    ]
-    return changes
+    counts = {f"attribute {name}": sum(name in own for own in names) for name in sorted(lost)}
+    return changes + lost_at("/meshes", counts)
 
 
 def _count_targets(tree: dict[str, Any]) -> int:

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common.schemes.matrix import SubdivisionMatrix
 
-from ..report import Change
+from ..changes import Change, counted
 from .tags import Tags
 
 # Layers are called as glTF calls attributes; other properties begin with an underscore.
@@ -182,4 +182,4 @@ def offsets_of(sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " F1"]:
 
 def dropped(names: dict[str, int]) -> tuple[Change, ...]:
     """Return a change for each kind of thing of which a reader dropped some."""
-    return tuple(Change("", f"{name} dropped", count) for name, count in names.items() if count)
+    return tuple(counted({("dropped", name): count for name, count in names.items()}))

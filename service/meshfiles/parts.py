@@ -11,6 +11,7 @@ from jaxtyping import Bool, Int
 from pns_common.mesh.rows import distinct_rows, marked, number_by_first_appearance, unit
 from pns_common.schemes.matrix import SubdivisionMatrix
 
+from ..changes import Change
 from ..gltf.constants import FLOAT
 from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Accessor
@@ -18,7 +19,6 @@ from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.selection import check_chosen
 from ..meshes.weld import canonical_zero
 from ..options import Options
-from ..report import Change
 from .mesh_file import (
     GROUP,
     MATERIAL,
@@ -29,6 +29,7 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    dropped,
     joined_layer,
     shown,
 )
@@ -90,7 +91,7 @@ def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
         material = NONE if materials is None else int(materials.of_face[place])
         primitive = _primitive(mesh, faces, number, lost)
         parts.append(Part(primitive, faces, material))
-    return parts, [Change("", f"{what} dropped", faces) for what, faces in lost.items()]
+    return parts, [*dropped(lost)]
 
 
 def kinds_of(mesh: MeshFile) -> Int[np.ndarray, " F"]:

@@ -31,13 +31,13 @@ from pns_common.report import Report
 from pns_common.schemes import CATMULL_CLARK
 
 from ..advice import Bends, count_bends
+from ..changes import Change, counted
 from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.refine.changes import near_miss_changes, near_misses
 from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
 from ..gltf.refine.normals import safe_unit
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Limits, Options
-from ..report import Change
 from ..stages import Stages
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
 from .parts import chosen_of
@@ -127,10 +127,10 @@ def refine_polygons(
     topology = control.mesh.topology()
     (misses,) = near_misses(control.mesh.vertices, topology, [made.reference_length])
     told = {
-        "vertices joined within weld_tolerance": control.near,
-        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
+        "joined": control.near,
+        "repeated-corners": int(mesh.sizes[control.faces].sum()) - len(control.places),
     }
-    changes = [Change("", what, count) for what, count in told.items() if count]
+    changes = counted(told)
     refined_faces = np.isin(np.repeat(np.arange(len(mesh.sizes)), mesh.sizes), control.faces)
     return Refined(
         mesh=refined,

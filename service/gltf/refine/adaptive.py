@@ -1,4 +1,4 @@
-"""Refined primitives of faces of several levels: ``tolerance``, ``max_faces``, ``max_edge_length``.
+"""Refined primitives of faces of several levels: ``tolerance``, ``max_faces`` and other goals.
 
 Values of corners are blended linearly in each face of the control mesh. Skins and morph targets
 follow the vertices' masks. Normals are those of the limit surface; where the file's part, on each

@@ -22,10 +22,10 @@ from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, Bends, count_bends
+from ...changes import Change
 from ...meshes.barycentric_grid import barycentric_grid
 from ...meshes.uv_charts import uv_blend
 from ...options import Options
-from ...report import Change
 from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
@@ -95,7 +95,7 @@ class MeshOutcome:
         """Return the outcome of another mesh with this geometry."""
         before, after = (f"/meshes/{index}" for index in (self.index, mesh))
         moved = [
-            Change(after + change.pointer.removeprefix(before), change.what, change.count)
+            replace(change, pointer=after + change.pointer.removeprefix(before))
             for change in self.changes
         ]
         return replace(self, index=mesh, changes=moved)
