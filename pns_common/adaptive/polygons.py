@@ -269,26 +269,40 @@ class PolygonStart(Start):
         known: Measured | None,
     ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]:
         mesh, enough = part.topology, self.goal.tolerance or 0.0
-        count, steps = mesh.face_count, DEEPER - (finer is not None)
-        errors, slabs, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
+        count, steps, rows = mesh.face_count, DEEPER - (finer is not None), part.exists.nonzero()[0]
+        made = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
+        errors, slabs, turns = made
+        fresh = np.ones(len(rows), dtype=bool)
+        if known is not None and len(known.codes):
+            codes = part.codes[rows]
+            there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
+            fresh = known.codes[there] != codes
+            errors[rows[~fresh]], slabs[rows[~fresh]] = (
+                of[there[~fresh]] for of in (known.errors, known.slabs)
+            )
+        new = rows[fresh]
+        if len(new) == 0:
+            return made
         corners, counts = padded(mesh, rows)
         points = places[part.names[mesh.corners[corners]]]
         frames = planes(points, counts)
         if finer is None:
-            patches = Patches(part, rows, np.arange(len(rows) + 1), inside=False)
-        else:
+            patches = Patches(part, new, np.arange(len(new) + 1), inside=False)
+        else:  # all faces of the control mesh
             quads = np.arange(len(mesh.corners))
             patches = Patches(finer, quads, mesh.offsets.astype(np.int64), inside=True)
-        slabs[rows, :SIDE] = near_enough(patches, frames, self.levels, enough, steps)
+        slabs[new, :SIDE] = near_enough(patches, frames[fresh], self.levels, enough, steps)
         heights = dot(points - frames[:, None, :3], frames[:, None, 3:])
         flat = np.maximum(
             slabs[rows, HIGH] - heights.min(axis=1), heights.max(axis=1) - slabs[rows, LOW]
         )
-        slabs[rows, SIDE] = self._side_distances(part, places, finer, rows, flat, frames, steps)
-        distance = np.maximum(flat, slabs[rows, SIDE])
-        turns = np.zeros(count)
-        errors[rows] = self.goal.errors(distance, turns[rows], points)
-        return errors, slabs, turns
+        asked = marked(new, count)
+        slabs[new, SIDE] = self._side_distances(
+            part, places, finer, rows, flat, frames, steps, asked
+        )[new]
+        distance = np.maximum(flat[fresh], slabs[new, SIDE])
+        errors[new] = self.goal.errors(distance, turns[new], points[fresh])
+        return made
 
     def _side_distances(
         self,
@@ -299,7 +313,8 @@ class PolygonStart(Start):
         flat: Float[np.ndarray, " N"],
         frames: Float[np.ndarray, "N 6"],
         steps: int,
-    ) -> Float[np.ndarray, " N"]:
+        wanted: Bool[np.ndarray, " F"],
+    ) -> Float[np.ndarray, " F"]:
         """Return how far sides can be from their curves, beyond which no slab bounds these."""
         mesh, distance = part.topology, np.zeros(part.topology.face_count)
         rim = mesh.edge_class == connectivity.BOUNDARY
@@ -307,10 +322,10 @@ class PolygonStart(Start):
         turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
         asked = (rim | turned)[mesh.corner_edges]
         owner = mesh.face_of(np.arange(len(mesh.corners))).astype(np.int64)
-        asked &= part.exists[owner]
+        asked &= wanted[owner]
         corners = np.flatnonzero(asked)
         if len(corners) == 0:
-            return distance[rows]
+            return distance
         ends = mesh.corners[np.stack([corners, following(mesh.offsets)[corners]])]
         begin, end = places[part.names[ends]]
         number = np.zeros(mesh.face_count, dtype=np.int64)
@@ -327,10 +342,10 @@ class PolygonStart(Start):
         size, edges = np.zeros(mesh.face_count), mesh.corner_edges[corners]
         size[rows] = flat
         most = np.zeros(len(mesh.edges))
-        np.maximum.at(most, edges, size[owner[corners]])
+        np.maximum.at(most, mesh.corner_edges, size[owner])
         counts = rim[edges] | (size[owner[corners]] >= EQUAL * most[edges])
         np.maximum.at(distance, owner[corners[counts]], found[counts])
-        return distance[rows]
+        return distance
 
 
 def padded(
