@@ -73,9 +73,10 @@ def refine(
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         tolerance: split faces that may be farther from the limit surface, alone; in the mesh's
             units, or a share of the diagonal of its box, as "0.1%". The result is an
-            ``AdaptiveRefinement``: faces of several levels, which meet without gaps. For triangles.
+            ``AdaptiveRefinement``: faces of several levels, which meet without gaps.
         angle: split faces over which shading turns by more degrees: between the normals of the
             limit surface at their corners and where the next level has vertices on their sides.
+            For triangles.
         max_faces: split the faces of the largest distance first, and end before there are more.
         max_edge_length: split faces with longer sides; as ``tolerance``.
         limit: put the last level's vertices where the base scheme would take them if it were
@@ -192,13 +193,13 @@ def _refine_to_goal(
     threads: int | None,
     progress: Callable[[int, int], None] | None,
 ) -> Refinement:
-    """Refine a mesh of triangles until a goal is reached; arguments as of ``refine``."""
+    """Refine a mesh until a goal is reached; arguments as of ``refine``."""
+    from pns_common.adaptive.polygon_refinement import refine_polygons
     from pns_common.adaptive.refine import LEARNED, goal_of, refine_to_goal
 
     given = "a tolerance, angle, max_faces or max_edge_length"
-    if scheme.base.polygons:
-        expected = f"loop or pns on triangles with {given}: polygons are refined by whole levels"
-        raise ParameterError("scheme", scheme.name, expected=expected)
+    if scheme.base.polygons and goals[1] is not None:
+        raise ParameterError("angle", goals[1], expected=f"None: {scheme.base.name} has no angles")
     if scheme.rule is not None and scheme.learned_levels != 1:
         expected = f"a model that acts at the first level alone with {given}"
         raise ParameterError("scheme", str(scheme.model), expected=expected)
@@ -224,8 +225,12 @@ def _refine_to_goal(
     shares.part(0.0, LEARNED)
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level = with_sharp_edges(level, kept, scheme)
-    first = _step(level, scheme, 0) if learns else None
-    made = refine_to_goal(level, first, scheme, kept, goal, deepest, shares)
+    if scheme.base.polygons:
+        first = _step(level, scheme, 0)
+        made = refine_polygons(level, first, scheme, kept, goal, deepest, shares)
+    else:
+        first = _step(level, scheme, 0) if learns else None
+        made = refine_to_goal(level, first, scheme, kept, goal, deepest, shares)
     if progress is not None:
         progress(made.mesh.face_count, made.mesh.face_count)
     return made

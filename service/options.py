@@ -140,8 +140,9 @@ class Options:
         if not self.goals:
             return
         with_goal = f"with {', '.join(self.goals)}"
+        polygons = self.scheme == "catmull-clark" and self.angle is not None
         wrong = {
-            "scheme": self.scheme == "catmull-clark" and "polygons are refined by whole levels",
+            "scheme": polygons and "polygons are refined by whole levels",
             "uv": self.uv == "smooth" and "texture coordinates are linear",
             "polygons": self.polygons != "off" and "triangles stay triangles",
             "limit": not self.limit and "vertices are on the limit surface",
@@ -224,9 +225,10 @@ DESCRIPTIONS = {
     "more levels give a finer mesh of one shape. Off: control points for further refinement",
     "tolerance": "refine faces only where they may be farther from the limit surface, by up to "
     f"{MAX_LEVELS} levels: a length in the file's units, or as in 0.1% a share of each mesh's "
-    "diagonal. Polygons are cut into triangles",
+    "diagonal",
     "angle": "refine faces only where shading turns over them by more degrees, measured at their "
-    "corners and where finer faces have vertices on their sides; sharp edges apart, as tolerance",
+    "corners and where finer faces have vertices on their sides; sharp edges apart, as tolerance. "
+    "Polygons are cut into triangles",
     "max_faces": "most faces of the file: those farthest from the limit surface are refined first. "
     "Of several meshes in a glTF each has the share that it has before",
     "max_edge_length": "refine faces only where their sides are longer; as tolerance",

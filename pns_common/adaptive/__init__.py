@@ -5,4 +5,7 @@ certificate.py  bounds of the distance between faces and the limit surface
 turning.py      angles by which shading turns over faces
 tree.py         which faces are split, and how neighbours of two levels meet
 refine.py       the refinement: ``refine`` with a goal
+
+quad_certificate.py, polygons.py and polygon_refinement.py are the last three for polygons over
+Catmull–Clark's scheme.
 """

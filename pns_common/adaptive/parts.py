@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import connectivity
 from pns_common.mesh.rows import marked
-from pns_common.mesh.topology import NO_WEIGHTS, Topology, build_topology
+from pns_common.mesh.topology import NO_WEIGHTS, TRIANGLE, Topology, build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import BaseScheme
 from pns_common.schemes.limit import limit_positions
@@ -42,7 +42,8 @@ class Part:
         depth: the level; that of the control mesh is 0.
         topology, points: its mesh; ``points`` are control points.
         names: (V,) numbers of its vertices that are the same at every level.
-        codes: (F,) numbers of its faces, ascending: that of child k of face c is 4 c + k.
+        codes: (F,) numbers of its faces, ascending: that of child k of face c is 4 c + k; a polygon
+            of the control mesh has its corners' numbers for those of its children.
         exists: (F,) faces that are children of split faces; others surround them.
     """
 
@@ -131,29 +132,35 @@ class Levels:
         """Return whether the edges of a level are as sharp as those they are halves of."""
         return depth >= self.deepest or self.sharp is None or depth < self.sharp
 
+    def children(self, mesh: Topology) -> Integer[np.ndarray, " F"] | int:
+        """Return how many children each face has."""
+        return np.diff(mesh.offsets) if self.base.polygons else CHILDREN
+
     def split(
         self, part: Part, split: Bool[np.ndarray, " F"], first_name: int
     ) -> tuple[Part, Refined, Integer[np.ndarray, " E"]]:
         """Return the part of the next level in which the children of some faces exist.
 
         Return also the name of the vertex that each edge of ``part`` gets there, from
-        ``first_name`` on, or NOT_THERE.
+        ``first_name`` on, or NOT_THERE. Faces are triangles or, of polygons' children, quads.
         """
-        touched = marked(part.topology.faces[split], part.topology.vertex_count)
-        around = np.logical_or.reduce(touched[part.topology.faces], axis=1)
+        faces = rows_of_faces(part.topology, part.topology.corners)
+        touched = marked(faces[split], part.topology.vertex_count)
+        around = np.logical_or.reduce(touched[faces], axis=1)
         near, vertices, edges = replace(part, exists=split).of_faces(around)
         mesh = near.topology
-        names = first_name + np.arange(len(mesh.edges))
+        points = self.base.place(near.points, mesh, self.blocks)
+        names = first_name + np.arange(len(points) - len(near.points))
         finer = Part(
             part.depth + 1,
             self.base.split(mesh, self.blocks, inherit=self.inherit(part.depth + 1)),
-            self.base.place(near.points, mesh, self.blocks),
+            points,
             np.concatenate([near.names, names]),
             (CHILDREN * near.codes[:, None] + np.arange(CHILDREN)).reshape(-1),
             np.repeat(near.exists, CHILDREN),
         )
         of_edges = np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
-        of_edges[edges] = names
+        of_edges[edges] = names[: len(mesh.edges)]
         return finer, Refined(vertices, mesh, np.arange(len(finer.names))), of_edges
 
     def settle(self, part: Part, rows: Integer[np.ndarray, " N"]) -> list[Settled]:
@@ -178,6 +185,10 @@ class Levels:
         spokes = np.flatnonzero(mesh.edges.min(axis=1) < len(moving))
         kept = np.arange(mesh.vertex_count)
         kept[far[spokes]] = mesh.vertex_count + spokes
+        if not mesh.triangles:  # the opposite corners, which come last, go to the quads' middles
+            kept[-mesh.face_count :] = (
+                mesh.vertex_count + len(mesh.edges) + np.arange(mesh.face_count)
+            )
         for depth in range(part.depth, self.deepest):
             steps.append(Refined(every, mesh, kept))
             points, every = self.base.place(points, mesh, self.blocks)[kept], np.arange(len(kept))
@@ -199,13 +210,25 @@ def cut_out(
 
     An edge of which not all faces are kept has the class that the others leave it.
     """
-    corners = mesh.faces[kept]
+    corners = rows_of_faces(mesh, mesh.corners)[kept]
     used = marked(corners, mesh.vertex_count)
     vertices, number = np.flatnonzero(used), (np.cumsum(used) - 1).astype(np.uint32)
-    made = build_topology(number[corners], len(vertices))
+    made = _built(number[corners], len(vertices))
     edges = np.empty(len(made.edges), dtype=np.int64)
-    edges[made.corner_edges] = mesh.face_edges[kept].reshape(-1)
+    edges[made.corner_edges] = rows_of_faces(mesh, mesh.corner_edges)[kept].reshape(-1)
     return with_rules_of(mesh, made, vertices, edges), vertices, edges
+
+
+def rows_of_faces(mesh: Topology, of_corners: Integer[np.ndarray, " H"]) -> np.ndarray:
+    """Return what corners have as a row of each face; faces have one degree."""
+    return of_corners.reshape(mesh.face_count, -1)
+
+
+def _built(faces: Integer[np.ndarray, "F N"], vertex_count: int) -> Topology:
+    if faces.shape[1] == TRIANGLE:
+        return build_topology(faces, vertex_count)
+    offsets = faces.shape[1] * np.arange(len(faces) + 1)
+    return build_topology((faces.reshape(-1), offsets), vertex_count)
 
 
 def with_rules_of(
@@ -240,23 +263,19 @@ def stars(
     """
     number = np.full(mesh.vertex_count, -1)
     number[rows] = np.arange(len(rows))
-    corners = np.flatnonzero(number[mesh.corners] >= 0)
-    at, star = (
-        np.stack(
-            [
-                corners,
-                corners - corners % 3 + (corners + 1) % 3,
-                corners - corners % 3 + (corners + 2) % 3,
-            ],
-            1,
-        ),
-        number[mesh.corners[corners]],
-    )
-    keys = star[:, None] * mesh.vertex_count + mesh.corners[at[:, 1:]]
+    corners, degree = np.flatnonzero(number[mesh.corners] >= 0), TRIANGLE if mesh.triangles else 4
+    first = (corners - corners % degree)[:, None]
+    at = first + (corners[:, None] + np.arange(degree)) % degree
+    star, beside = number[mesh.corners[corners]], [1, degree - 1]
+    keys = star[:, None] * mesh.vertex_count + mesh.corners[at[:, beside]]
     ring, of_corner = np.unique(keys, return_inverse=True)
     faces = np.column_stack([star, len(rows) + of_corner.reshape(-1, 2)])
     vertices = np.concatenate([rows, ring % mesh.vertex_count])
-    made = build_topology(faces.astype(np.uint32), len(vertices))
+    if degree > TRIANGLE:
+        opposite = len(vertices) + np.arange(len(corners))
+        faces = np.insert(faces, 2, opposite, axis=1)
+        vertices = np.concatenate([vertices, mesh.corners[at[:, 2]]])
+    made = _built(faces.astype(np.uint32), len(vertices))
     edges = np.empty(len(made.edges), dtype=np.int64)
     edges[made.corner_edges] = mesh.corner_edges[at].reshape(-1)
     return with_rules_of(mesh, made, vertices, edges), vertices

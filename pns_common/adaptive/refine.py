@@ -263,21 +263,40 @@ def refine_to_goal(
         deepest: the most levels that may be used.
         shares: what reports progress.
     """
+    start = start_of(Start, level, first, scheme, creases, goal, deepest, shares)
+    return _written(tree_of(start, shares), level, first, scheme, start.levels, goal)
+
+
+def start_of(
+    kind: type[Start],
+    level: Level,
+    first: Step | None,
+    scheme: Scheme,
+    creases: Creases,
+    goal: Goal,
+    deepest: int,
+    shares: Shares,
+) -> Start:
+    """Return the start of trees; arguments as of ``refine_to_goal``."""
     mesh = level.topology
     levels = Levels(scheme.base, level.blocks.quiet(), deepest, creases.levels)
     numbers, faces = np.arange(len(level.points)), np.arange(mesh.face_count)
     control = Part(0, mesh, level.points, numbers, faces, np.ones(len(faces), dtype=bool))
-    start = Start(control, None, levels, goal, shares.reach)
+    start = kind(control, None, levels, goal, shares.reach)
     if first is not None:
         every = np.arange(len(first.points))
         topology = scheme.base.split(mesh, levels.blocks, inherit=levels.inherit(1))
-        codes, there = np.arange(CHILDREN * len(faces)), np.ones(CHILDREN * len(faces), dtype=bool)
-        finer = Part(1, topology, first.points, every, codes, there)
+        codes = np.arange(topology.face_count)
+        finer = Part(1, topology, first.points, every, codes, np.ones(len(codes), dtype=bool))
         start = replace(start, first=(finer, Refined(numbers, mesh, every)))
+    return start
+
+
+def tree_of(start: Start, shares: Shares) -> Tree:
+    """Return the tree that reaches the goal of a start."""
     shares.part(LEARNED if start.first is not None else 0.0, GROWN)
-    find = _near_enough if goal.max_faces is None else _with_so_many
-    tree = find(start, shares)
-    return _written(tree, level, first, scheme, levels, goal)
+    find = _near_enough if start.goal.max_faces is None else _with_so_many
+    return find(start, shares)
 
 
 def _near_enough(start: Start, shares: Shares) -> Tree:
@@ -298,8 +317,8 @@ def _near_enough(start: Start, shares: Shares) -> Tree:
 def _with_so_many(start: Start, shares: Shares) -> Tree:
     """Return a tree of so many faces as are asked for, or fewer."""
     goal, tree = start.goal, start.grow(np.inf)
-    most, bounded = goal.max_faces or 0, goal.tolerance is not None or goal.max_edge_length
-    threshold, least = math.inf, 1.0 if bounded else 0.0
+    most, bounds = goal.max_faces or 0, (goal.tolerance, goal.angle, goal.max_edge_length)
+    threshold, least = math.inf, 0.0 if bounds == (None, None, None) else 1.0
     while True:
         made = tree.count(tree.closed(tree.split))
         left = _largest_left(tree, start.levels.deepest)
@@ -343,19 +362,17 @@ def _largest_left(tree: Tree, deepest: int) -> float:
 def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
     """Return depth and row of split faces, those of the largest errors first, by place if equal."""
     errors, above = [layer.errors.copy() for layer in tree.layers], list[np.ndarray]()
-    for finer, coarser, of_finer, of_coarser in zip(
-        tree.layers[:0:-1], tree.layers[-2::-1], errors[:0:-1], errors[-2::-1], strict=True
-    ):
+    for depth in range(len(errors) - 1, 0, -1):
         # A face is not better than its children, so that none comes before its parent.
-        rows = np.flatnonzero(finer.part.exists)
-        parents = np.searchsorted(coarser.part.codes, finer.part.codes[rows] // CHILDREN)
-        np.maximum.at(of_coarser, parents, of_finer[rows])
+        part = tree.layers[depth].part
+        rows = np.flatnonzero(part.exists)
+        np.maximum.at(errors[depth - 1], tree.parents(depth, part.codes[rows]), errors[depth][rows])
     at, values, middles = above, list[np.ndarray](), list[np.ndarray]()
     for depth, layer in enumerate(tree.layers):
-        rows, part = np.flatnonzero(layer.split), layer.part
+        rows = np.flatnonzero(layer.split)
         at.append(np.stack([np.full(len(rows), depth), rows], axis=1))
         values.append(errors[depth][rows])
-        middles.append(tree.places[part.names[part.topology.faces[rows]]].mean(axis=1))
+        middles.append(tree.middles_of(depth, rows))
     places, error = np.concatenate(middles), np.concatenate(values)
     size = np.abs(places).max(initial=0.0) or 1.0
     keys = np.round(places / size, DIGITS)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
@@ -22,6 +23,7 @@ from pns_common.adaptive.parts import (
     Part,
     Refined,
     Settled,
+    rows_of_faces,
 )
 from pns_common.adaptive.turning import chord, turns
 from pns_common.kernels import connectivity as kernels
@@ -56,7 +58,7 @@ class Goal:
         self,
         distance: Float[np.ndarray, " N"],
         turns: Float[np.ndarray, " N"],
-        triangles: Float[np.ndarray, "N 3 3"],
+        triangles: Float[np.ndarray, "N K 3"],
     ) -> Float[np.ndarray, " N"]:
         """Return the errors of faces: above 1 where they are to be split.
 
@@ -169,6 +171,15 @@ class Tree:
                 made[depth - 1][np.searchsorted(above, asked)] = True
         return made
 
+    def parents(self, depth: int, codes: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
+        """Return the rows of the parents of faces of a level in the level before."""
+        return np.searchsorted(self.layers[depth - 1].part.codes, codes // CHILDREN)
+
+    def middles_of(self, depth: int, rows: Integer[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
+        """Return the middles of faces."""
+        part = self.layers[depth].part
+        return self.places[part.names[part.topology.faces[rows]]].mean(axis=1)
+
     def cut_distances(
         self, depth: int, rows: Integer[np.ndarray, " N"], hit: Bool[np.ndarray, " E"]
     ) -> Float[np.ndarray, " N"]:
@@ -221,6 +232,7 @@ class Start:
     levels: Levels
     goal: Goal
     tell: Callable[[float, int], None]
+    tree: ClassVar[type[Tree]] = Tree
 
     def grow(
         self,
@@ -245,7 +257,7 @@ class Start:
             if self.first is not None and depth == 0:
                 finer, step = self.first
                 middles = names + np.arange(len(part.topology.edges))
-                places = _longer(places, len(middles))
+                places = _longer(places, len(finer.names) - names)
                 settled = self._settle(finer, places)
             else:
                 settled = self._settle(part, places)
@@ -262,24 +274,27 @@ class Start:
             split &= depth < self.levels.deepest
             if split.any():
                 if finer is not None:
-                    finer = replace(finer, exists=np.repeat(split, CHILDREN))
+                    finer = replace(
+                        finer, exists=np.repeat(split, self.levels.children(part.topology))
+                    )
                 else:
                     finer, step, middles = self.levels.split(part, split, names)
-                    places = _longer(places, len(step.topology.edges))
+                    places = _longer(places, len(finer.names) - len(step.vertices))
                 names = len(places)
             layers.append(Layer(part, split, *measured, middles, step, settled))
             done += there - int(split.sum())
             if finer is None or not split.any():
                 break
             part = finer
-        return Tree(layers, places)
+        return self.tree(layers, places)
 
     def _no_middles(self, part: Part) -> Integer[np.ndarray, " E"]:
         return np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)
 
     def _settle(self, part: Part, places: Float[np.ndarray, "N 3"]) -> list[Settled]:
         """Put vertices of faces that exist, and are not yet there, on the limit."""
-        used = marked(part.topology.faces[part.exists], len(part.points))
+        faces = rows_of_faces(part.topology, part.topology.corners)
+        used = marked(faces[part.exists], len(part.points))
         if part.depth == 0 or (self.first is not None and part.depth == 1):
             used[:] = True  # vertices of no face are written too
         made = self.levels.settle(part, np.flatnonzero(used & np.isnan(places[part.names, 0])))

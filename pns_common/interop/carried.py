@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.adaptive.corners import Blend, join_corners
+from pns_common.adaptive.polygon_refinement import PolygonRefinement
 from pns_common.adaptive.refine import AdaptiveRefinement
 from pns_common.carry.carried import Carried, Column, Columns, in_type_of, rule_for
 from pns_common.carry.carried import refine_carried as refine_columns
@@ -87,6 +88,9 @@ def refine_carried(
     options["creases"] = _renamed(creases, joined) if named else creases
     surface_faces = joined[given.corners], given.offsets
     refinement = refine(Mesh(given.vertices[first], surface_faces), scheme, levels, **options)
+    if isinstance(refinement, PolygonRefinement):
+        expected = "triangles, or a Mesh: polygons of several levels carry no data of libraries yet"
+        raise ParameterError("mesh", "polygons", expected=expected)
     if isinstance(refinement, AdaptiveRefinement):
         return _at_faces(mesh, given, joined, refinement), refinement
 

@@ -281,6 +281,9 @@ def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
             message = f"{scheme.base.name} refines all faces of a glTF, or none"
             raise InvalidParameter("scheme", message)
         return scheme
+    if options.goals and scheme.base.polygons:
+        message = f"with {', '.join(options.goals)} triangles of a glTF stay triangles"
+        raise InvalidParameter("scheme", f"{message}: leave scheme out")
     if options.polygons == "auto" and scheme.for_polygons is not None and mostly_polygons(upload):
         return scheme.for_polygons()
     return scheme
@@ -288,7 +291,7 @@ def _for_polygons(upload: Upload, scheme: Scheme, options: Options) -> Scheme:
 
 def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
     """Return the scheme that refines polygons as such; None: they are cut into triangles."""
-    if options.goals:
+    if options.angle is not None:
         return None
     if not options.learns or model is not None:
         made = make_scheme(options, model)

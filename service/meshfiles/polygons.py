@@ -10,14 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
+from pns_common.adaptive.polygon_refinement import PolygonRefinement
 from pns_common.carry import rules
-from pns_common.carry.carried import Carrier, Column
+from pns_common.carry.carried import Carrier, Column, in_type_of
+from pns_common.errors import ParameterError
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh, fans
 from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
-from pns_common.mesh.rows import distinct_rows, dot, number_by_first_appearance
+from pns_common.mesh.rows import as_words, distinct_rows, dot, number_by_first_appearance
 from pns_common.mesh.topology import following
 from pns_common.operator.scheme import Scheme
 from pns_common.parallel import Blocks, available_threads
@@ -28,13 +30,13 @@ from pns_common.schemes import CATMULL_CLARK
 
 from ..advice import Bends, count_bends
 from ..changes import Change, counted
-from ..errors import UnrefinableError
+from ..errors import InvalidParameter, UnrefinableError, check_limit
 from ..gltf.refine.changes import near_miss_changes, near_misses
 from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.normals import safe_unit
 from ..meshes.creases import chosen_creases, hard_edges
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
-from ..options import Options
+from ..options import Limits, Options
 from ..stages import Stages
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
 from .parts import chosen_of
@@ -89,13 +91,21 @@ class Refined:
 
 
 def refine_polygons(
-    mesh: MeshFile, scheme: Scheme, options: Options, stages: Stages, *, traced: bool
+    mesh: MeshFile,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    stages: Stages,
+    *,
+    traced: bool,
 ) -> Refined:
     """Refine polygons; `traced` asks for the parents of vertices.
 
     Raises:
         MeshError: a face cannot be refined.
         UnrefinableError: no face of three different vertices.
+        InvalidParameter: a goal cannot be reached.
+        LimitError: a goal takes too many faces.
     """
     with stages.stage("weld", 0.0, 0.1):
         control = _control(mesh, options)
@@ -106,23 +116,15 @@ def refine_polygons(
         if not picked.any():
             raise UnrefinableError("no chosen face has three different vertices")
     with stages.stage("refine", 0.1, 0.7):
-        made = refine(
-            control.mesh,
-            scheme,
-            options.levels,
-            options.reference_length,
-            limit=options.limit,
-            creases=creases,
-            faces=picked,
-            progress=lambda done, total: stages.reach(done / total),
-        )
+        made = _made(control.mesh, scheme, options, limits, creases, picked, stages)
     with stages.stage("attributes", 0.7, 1.0):
         refined = _with_layers(mesh, control, made, options)
     if traced:
         parents, shape = made.parents, (len(refined.vertices), len(mesh.vertices))
         parents = replace(parents, columns=control.vertices[parents.columns], shape=shape)
         refined = replace(refined, parents=parents)
-    (misses,) = near_misses(control.mesh.vertices, made.topologies[0], [made.reference_length])
+    topology = control.mesh.topology()
+    (misses,) = near_misses(control.mesh.vertices, topology, [made.reference_length])
     told = {
         "joined": control.near,
         "repeated-corners": int(mesh.sizes[control.faces].sum()) - len(control.places),
@@ -139,6 +141,36 @@ def refine_polygons(
         bends=count_bends(control.mesh, creases, options)[0],
         changes=[*changes, *near_miss_changes(misses, "")],
     )
+
+
+def _made(
+    mesh: Mesh,
+    scheme: Scheme,
+    options: Options,
+    limits: Limits,
+    creases: Creases,
+    picked: Bool[np.ndarray, " F"] | None,
+    stages: Stages,
+) -> Refinement:
+    def watch(done: int, total: int) -> None:
+        if options.goals and not done:  # a level of a tree, whose faces may not all be written
+            check_limit("faces", total // 2, limits.max_faces, "ask for less by tolerance")
+        stages.reach(done / total)
+
+    try:
+        return refine(
+            mesh,
+            scheme,
+            None if options.goals else options.levels,
+            options.reference_length,
+            **options.goals,
+            limit=options.limit,
+            creases=creases,
+            faces=picked,
+            progress=watch,
+        )
+    except ParameterError as error:
+        raise InvalidParameter(error.name, str(error)) from error
 
 
 def _control(mesh: MeshFile, options: Options) -> _Control:
@@ -195,12 +227,15 @@ def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
 def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners, selected = made.mesh.corners, made.selected
-    carrier = Carrier(made.topologies, CATMULL_CLARK, options.limit, Blocks(available_threads()))
+    if isinstance(made, PolygonRefinement):
+        carrier = made
+    else:
+        blocks = Blocks(available_threads())
+        carrier = Carrier(made.topologies, CATMULL_CLARK, options.limit, blocks)
     of_face = control.faces[carrier.face_parents]
-    layers = {
-        name: _refined(name, layer, control, carrier, options)
-        for name, layer in mesh.layers.items()
-    }
+    layers: dict[str, Layer] = {}
+    for name, layer in mesh.layers.items():
+        layers[name] = _refined(name, layer, control, carrier, options)
     still = np.zeros(0, dtype=np.int64)
     if selected is not None:
         of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
@@ -260,18 +295,24 @@ def _with(
 
 
 def _refined(
-    name: str, layer: Layer, control: _Control, carrier: Carrier, options: Options
+    name: str,
+    layer: Layer,
+    control: _Control,
+    carrier: Carrier | PolygonRefinement,
+    options: Options,
 ) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
     values = layer.values[np.maximum(rows, 0)]
+    bare = np.logical_or.reduceat(rows < 0, control.mesh.offsets[:-1])
+    whole = values.dtype.kind != "f" and name != COLOUR
+    if isinstance(carrier, PolygonRefinement):
+        return _at_faces(values, bare, carrier, whole=whole)
     if name == UV and options.uv == "smooth":
         column = Column(values, rules.smooth)
     else:
-        whole = values.dtype.kind != "f" and name != COLOUR
         column = Column(values, rules.nearest if whole else rules.linear, same=rows[:, None])
     values, corners = carrier.at_points(column)
-    bare = np.logical_or.reduceat(rows < 0, control.mesh.offsets[:-1])
     if not bare.any():
         return Layer(values, corners)
     bare = np.repeat(bare[carrier.face_parents], 4)
@@ -279,6 +320,20 @@ def _refined(
     corners = np.full(len(corners), NONE)
     corners[~bare] = inside
     return Layer(values[used], corners)
+
+
+def _at_faces(
+    values: np.ndarray, bare: Bool[np.ndarray, " F"], made: PolygonRefinement, *, whole: bool
+) -> Layer:
+    """Return values at corners of faces of several levels; ``bare`` faces have none."""
+    own = values[made.nearest_corners] if whole else in_type_of(values, made.at_corners(values))
+    # Corners of one vertex with one value stay one.
+    words = np.column_stack([as_words(made.mesh.corners[:, None]), as_words(own)])
+    number, first = number_by_first_appearance(distinct_rows(words))
+    corners = np.where(bare[made.face_parents].repeat(np.diff(made.mesh.offsets)), NONE, number)
+    used, inside = np.unique(corners[corners >= 0], return_inverse=True)
+    corners[corners >= 0] = inside
+    return Layer(own[first[used]], corners)
 
 
 def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:
@@ -327,8 +382,12 @@ def _covering(mesh: Mesh) -> Int[np.ndarray, "T 3"]:
 
 def _smooth_normals(made: Refinement) -> Layer:
     """Return normals that are smooth but across the edges that are sharp at the last level."""
-    mesh, last, sharp = made.mesh, made.topologies[-1], None
-    if last.is_sharp.any():
+    mesh, sharp = made.mesh, None
+    last = made.control.topology if isinstance(made, PolygonRefinement) else made.topologies[-1]
+    if isinstance(made, PolygonRefinement):
+        begins = (made.edge_parents >= 0) & last.is_sharp[made.edge_parents]
+        sharp = np.stack([mesh.corners, mesh.corners[following(mesh.offsets)]], axis=1)[begins]
+    elif last.is_sharp.any():
         fine = CATMULL_CLARK.split(last, Blocks())
         begins = fine.is_sharp[fine.corner_edges]
         begins = begins if made.selected is None else begins[made.selected.places]

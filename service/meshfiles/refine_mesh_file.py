@@ -62,7 +62,7 @@ def refine_mesh_file(
         options = replace(options, normals="smooth" if smooth else "keep")
     try:
         if scheme.base.polygons:
-            made = refine_polygons(grouped, scheme, options, stages, traced=traced)
+            made = refine_polygons(grouped, scheme, options, limits, stages, traced=traced)
         else:
             made = _refine_triangles(grouped, scheme, options, limits, stages, traced=traced)
     except MeshError as error:
@@ -164,7 +164,7 @@ def _stated(mesh: MeshFile, options: Options) -> Callable[[ControlMesh, Creases]
 def faces_after(mesh: MeshFile, options: Options) -> int:
     """Return how many faces a mesh file becomes: four of a triangle, a quad for each corner.
 
-    Goals cut polygons into triangles.
+    Of a goal it is what is known of triangles.
     """
     if options.goals or (mesh.sizes == 3).all():
         return options.faces_after(len(mesh.corners) - 2 * len(mesh.sizes))

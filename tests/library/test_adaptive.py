@@ -384,9 +384,6 @@ def test_too_few_faces_say_how_many_are_possible():
 
 
 def test_schemes_that_cannot_are_named():
-    quads = Mesh(np.eye(4)[:, :3], [[0, 1, 2, 3]])
-    with pytest.raises(ParameterError, match="whole levels"):
-        refine(quads, "pns", tolerance=1.0)
     with pytest.raises(ParameterError, match="first level alone"):
         refine(Mesh(*block(1)[:2]), pns(load_model("paper")), tolerance=1.0)
     made = refine(Mesh(*block(1)[:2]), "loop", tolerance=1.0)
