@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from pns_common.scheme_names import BASE_SCHEMES
 
@@ -31,13 +31,21 @@ Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
 # `angle:` is followed by degrees.
-CREASE_PATTERN = r"auto|off|normals|angle:\d{1,3}(\.\d{1,6})?"
+_CREASE = r"^(auto|off|normals|angle:\d{1,3}(\.\d{1,6})?)$"
 
 # A length in the file's units, or a share of the mesh's diagonal; empty: none.
-LENGTH_PATTERN = r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?%?"
+_LENGTH = r"^(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?%?$"
 
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
+
+# Groups of `--help`, in their order.
+EVERYDAY, FILES, MORE, RESEARCH = "Everyday", "Files", "More", "Research"
+
+
+def _told(panel: str, metavar: str | None = None, **bounds: Any) -> dict[str, Any]:
+    """Return how the command line shows an option, and what its type does not say of its bounds."""
+    return {"panel": panel, "metavar": metavar, "bounds": bounds}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,40 +60,44 @@ class Options:
     `material` and `group` name the faces to refine (None: all). Raises InvalidParameter.
     """
 
-    levels: int = DEFAULT_LEVELS
-    scheme: SchemeName = "auto"
-    budget: float | None = None
-    reference_length: float | Literal["auto"] = "auto"
-    diagnostics: Diagnostics = "summary"
-    uv: UvRule = "linear"
-    normals: NormalRule = "auto"
-    crease: str = "auto"
-    weld: WeldRule = "position"
-    weld_tolerance: float = 0.0
-    border: BorderRule = "smooth"
-    polygons: PolygonRule = "off"
-    material: str | None = None
-    group: str | None = None
-    compress: Compression = "none"
-    limit: bool = True
-    tolerance: str | None = None
-    angle: float | None = None
-    max_faces: int | None = None
-    max_edge_length: str | None = None
+    levels: int = field(default=DEFAULT_LEVELS, metadata=_told(EVERYDAY, ge=1, le=MAX_LEVELS))
+    tolerance: str | None = field(default=None, metadata=_told(EVERYDAY, "X|X%", pattern=_LENGTH))
+    angle: float | None = field(default=None, metadata=_told(EVERYDAY, "DEG", gt=0, lt=180))
+    max_faces: int | None = field(default=None, metadata=_told(EVERYDAY, "N", ge=1))
+    max_edge_length: str | None = field(
+        default=None, metadata=_told(EVERYDAY, "X|X%", pattern=_LENGTH)
+    )
+    crease: str = field(
+        default="auto", metadata=_told(EVERYDAY, "auto|off|normals|angle:DEG", pattern=_CREASE)
+    )
+    scheme: SchemeName = field(default="auto", metadata=_told(EVERYDAY))
+    limit: bool = field(default=True, metadata=_told(EVERYDAY))
+    normals: NormalRule = field(default="auto", metadata=_told(EVERYDAY))
+    uv: UvRule = field(default="linear", metadata=_told(MORE))
+    weld: WeldRule = field(default="position", metadata=_told(MORE))
+    weld_tolerance: float = field(
+        default=0.0, metadata=_told(MORE, "X", ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)
+    )
+    border: BorderRule = field(default="smooth", metadata=_told(MORE))
+    polygons: PolygonRule = field(default="off", metadata=_told(MORE))
+    material: str | None = field(default=None, metadata=_told(MORE, "NAME"))
+    group: str | None = field(default=None, metadata=_told(MORE, "NAME"))
+    compress: Compression = field(default="none", metadata=_told(FILES))
+    budget: float | None = field(
+        default=None, metadata=_told(RESEARCH, "C", ge=0, allow_inf_nan=False)
+    )
+    reference_length: float | Literal["auto"] = field(
+        default="auto", metadata=_told(RESEARCH, "auto|X")
+    )
+    diagnostics: Diagnostics = field(default="summary", metadata=_told(RESEARCH))
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
             raise InvalidParameter(
                 "levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}"
             )
-        check_choice("scheme", self.scheme, get_args(SchemeName))
-        check_choice("diagnostics", self.diagnostics, get_args(Diagnostics))
-        check_choice("compress", self.compress, get_args(Compression))
-        check_choice("uv", self.uv, get_args(UvRule))
-        check_choice("normals", self.normals, get_args(NormalRule))
-        check_choice("weld", self.weld, get_args(WeldRule))
-        check_choice("border", self.border, get_args(BorderRule))
-        check_choice("polygons", self.polygons, get_args(PolygonRule))
+        for name, choices in _CHOICES.items():
+            check_choice(name, getattr(self, name), choices)
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         if self.reference_length != "auto" and not (
@@ -94,7 +106,7 @@ class Options:
             raise InvalidParameter(
                 "reference_length", "reference_length must be 'auto' or a finite positive number"
             )
-        if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
+        if not re.fullmatch(_CREASE, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease",
                 "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees, "
@@ -115,7 +127,7 @@ class Options:
             given = getattr(self, name)
             if given is None:
                 continue
-            if not re.fullmatch(LENGTH_PATTERN, given) or float(given.rstrip("%")) <= 0:
+            if not re.fullmatch(_LENGTH, given) or float(given.rstrip("%")) <= 0:
                 expected = "must be a length above 0, or a share of the diagonal, as in 0.1%"
                 raise InvalidParameter(name, f"{name} is {given}; it {expected}")
         if self.angle is not None and not 0 < self.angle < 180:
@@ -218,6 +230,12 @@ DESCRIPTIONS = {
     "max_faces": "most faces of the file: those farthest from the limit surface are refined first. "
     "Of several meshes in a glTF each has the share that it has before",
     "max_edge_length": "refine faces only where their sides are longer; as tolerance",
+}
+
+_CHOICES = {
+    name: get_args(hint)
+    for name, hint in get_type_hints(Options).items()
+    if get_origin(hint) is Literal
 }
 
 

@@ -74,7 +74,8 @@ def angle_weighted_normals(
     read = points, faces, triangles
     blocks.run(len(faces), kernels.measure_triangles, *read, normals, angles)
     kernels.add_corners(normals, angles, groups, triangles, total)
-    blocks.quiet().run(count, kernels.scale_to_unit, total)
+    # Blocks of groups, not of faces of many triangles.
+    Blocks(blocks.threads).run(count, kernels.scale_to_unit, total)
     return total
 
 

@@ -282,14 +282,7 @@ def converted(
             written = replace(written, triangles=_triangles_of(refined))
         else:
             near = nearby(refined.libraries, Opened(siblings))
-            kept, changes = held(replace(refined, libraries=near), target)
-            written = Written(
-                FORMATS[target].write(kept),
-                with_changes(report, changes),
-                len(kept.sizes),
-                _triangles_of(kept),
-                parents=_map_of(kept, target),
-            )
+            written = _of_mesh(replace(refined, libraries=near), report, [], target)
     return replace(written, seconds=stages.seconds, faces_in=len(mesh.sizes))
 
 
@@ -297,10 +290,17 @@ def _triangles_of(mesh: MeshFile) -> int:
     return len(mesh.corners) - 2 * len(mesh.sizes)
 
 
-def _map_of(mesh: MeshFile, target: str) -> Arrays:
-    if mesh.parents is None:
-        return {}
-    return matrix_arrays(mesh.parents.take(FORMATS[target].order(mesh)))
+def _of_mesh(
+    mesh: MeshFile, report: dict[str, Any], changes: Sequence[Change], target: str
+) -> Written:
+    """Write what a format can hold of a refined mesh; report what it cannot."""
+    kept, lost = held(mesh, target)
+    report = with_changes(report, [*changes, *lost])
+    parents: Arrays = {}
+    if kept.parents is not None:
+        parents = matrix_arrays(kept.parents.take(FORMATS[target].order(kept)))
+    content, faces = FORMATS[target].write(kept), len(kept.sizes)
+    return Written(content, report, faces, _triangles_of(kept), parents=parents)
 
 
 def _taken(
@@ -399,9 +399,7 @@ def _flattened(
     siblings: SiblingFiles,
 ) -> Written:
     """Refine a glTF and write its scene as one mesh."""
-    changes: list[Change] = []
-    if options.compress != "none":
-        changes.append(NOT_COMPRESSED)
+    changes = [NOT_COMPRESSED] if options.compress != "none" else []
     # How many faces a goal makes of one is not known yet.
     each = 1 if options.goals else 4**options.levels
 
@@ -415,12 +413,9 @@ def _flattened(
             for mesh, refined in scene.meshes.items()
         }
         mesh, lost = flatten(scene.upload, surfaces, target, limits)
-        kept, also_lost = held(mesh, target)
-        content = FORMATS[target].write(kept)
-    # A mesh that several nodes show is there several times.
-    report = with_changes(scene.report, [*changes, *lost, *also_lost])
-    faces = len(kept.sizes)
-    return Written(content, report, faces, faces, stages.seconds, scene.faces_in)
+        # A mesh that several nodes show is there several times.
+        written = _of_mesh(mesh, scene.report, [*changes, *lost], target)
+    return replace(written, seconds=stages.seconds, faces_in=scene.faces_in)
 
 
 @contextmanager

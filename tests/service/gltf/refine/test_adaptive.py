@@ -92,6 +92,12 @@ def test_normals_are_those_of_the_limit_surface():
     )
 
 
+def test_normals_of_their_author_stay():
+    up = np.tile([0.0, 0.0, 1.0], (len(shaped()["POSITION"]), 1)).astype(np.float32)
+    _, attributes = files.primitive_of(refined([shaped(NORMAL=up)], **GOAL).glb)
+    assert (attributes["NORMAL"] == [0, 0, 1]).all(axis=1).mean() > 1 / 2
+
+
 def test_mesh_files_are_refined_alike():
     shape, made = shaped(), library(**GOAL)
     rows = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in shape["POSITION"].astype(float).tolist())
