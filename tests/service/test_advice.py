@@ -1,7 +1,5 @@
 """advice: where the result is in doubt or little changed, and the option that helps."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
