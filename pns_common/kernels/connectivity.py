@@ -17,6 +17,7 @@ from pns_common.kernels import (
     inlined,
     kernel,
     u4_1d,
+    u4_2d,
 )
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = 0, 1, 2, 3
@@ -103,6 +104,14 @@ def number_edges(
         if not fresh and plain[0] == 1 and _may_have_twin(corner_edges, links, f):
             plain[0] = 0
     return count
+
+
+@kernel
+def read_links(begin: int, end: int, low: u4_1d, links: i4_2d, edges: u4_2d, half_edges: i4_2d):
+    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
+    for e in range(max(begin, 0), end):
+        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
+        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
 
 
 @inlined

@@ -8,12 +8,24 @@ q_k, with d_j the vertex of corner j's face. In a closed sector q_k = q_0.
 
 from __future__ import annotations
 
-from pns_common.kernels import Connectivity, b1_1d, f8_2d, i4_1d, i8_1d, inlined, kernel, u4_1d
+from pns_common.kernels import (
+    Connectivity,
+    b1_1d,
+    f8_1d,
+    f8_2d,
+    i4_1d,
+    i8_1d,
+    inlined,
+    kernel,
+    u4_1d,
+)
 from pns_common.kernels.connectivity import face_of, following_corner, opposed, preceding_corner
-from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over
+from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over, row
 
 # Tangents that span less than this, of the product of their lengths, span no plane.
 NO_PLANE = 1e-9
+# A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
+CANCELLED = 1e-9
 
 
 @kernel
@@ -108,6 +120,24 @@ def sector_normals(
         normal = over(normal, divisor(normal))
         for k in range(3):
             to[s, k] = normal[k]
+
+
+@kernel
+def mean_of_sectors(normals: f8_2d, vertices: u4_1d, to: f8_2d, lengths: f8_1d):
+    """Write the unit mean of the normals of each vertex's sectors; 0 where they cancel.
+
+    ``to`` (V, 3) and ``lengths`` (V,) are 0 on entry.
+    """
+    for s in range(normals.shape[0]):
+        v = vertices[s]
+        lengths[v] += norm(row(normals, s))
+        for k in range(3):
+            to[v, k] += normals[s, k]
+    for v in range(to.shape[0]):
+        mean = row(to, v)
+        length = divisor(mean) if norm(mean) > CANCELLED * lengths[v] else 0.0
+        for k in range(3):
+            to[v, k] = mean[k] / length if length > 0 else 0.0
 
 
 @inlined

@@ -437,7 +437,7 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
     repeats, repeating = np.zeros(0, dtype=bool), False
     if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
@@ -504,8 +504,9 @@ def split_into(
     count += 2 * edge_count
     edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
     edge_class, soft = np.empty(count, np.int8), NO_WEIGHTS
+    write = split.split_edges_into_quads if quads else split.split_edges_of_triangles
     to = corner_edges, edges, half_edges, edge_class
-    blocks.run(parent.face_count, split.split_edges, read, quads, halves, *to)
+    blocks.run(parent.face_count, write, read, halves, *to)
     if inherit and len(parent.soft):
         rows, soft = np.flatnonzero(parent.soft), np.zeros(count)
         soft[halves[rows]] = parent.soft[rows, None]
@@ -580,7 +581,10 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
+    corners: UInt32[np.ndarray, " H"],
+    offsets: Integer[np.ndarray, " F1"],
+    vertex_count: int,
+    blocks: Blocks,
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -592,9 +596,8 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges, links = np.empty((made, 2), np.uint32), links[:made]
-    edges[:, 0], edges[:, 1] = low[:made], links[:, kernels.HIGH]
-    half_edges = np.ascontiguousarray(links[:, kernels.FIRST :])
+    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
+    blocks.quiet().run(made, kernels.read_links, low, links, edges, half_edges)
     return edges, half_edges, corner_edges, bool(plain[0])
 
 

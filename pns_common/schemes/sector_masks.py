@@ -9,14 +9,11 @@ import numpy as np
 from jaxtyping import Float, Integer, Shaped
 
 from pns_common.kernels import limit as kernels
-from pns_common.mesh.rows import norm, unit
 from pns_common.mesh.sectors import Sectors, find_sectors
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
 
 CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
-# A sum of unit vectors below this, of the sum of their lengths, is what rounding leaves.
-CANCELLED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +61,9 @@ def sector_normals(
     normals = np.empty((len(kind), 3))
     read = around.vertex, around.starts, around.spokes, at, masks, kind == CORNER
     blocks.run(len(kind), kernels.sector_normals, points, *read, normals)
-    lengths = np.bincount(around.vertex, norm(normals), count)
-    means = np.stack([np.bincount(around.vertex, own, count) for own in normals.T], axis=1)
-    means[norm(means) <= CANCELLED * lengths] = 0.0
-    return LimitNormals(unit(means), normals, around.of_corner)
+    means = np.zeros((count, 3))
+    kernels.mean_of_sectors(normals, around.vertex, means, np.zeros(count))
+    return LimitNormals(means, normals, around.of_corner)
 
 
 def mask_tables(
