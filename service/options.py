@@ -46,9 +46,9 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface, with its normals; `tolerance`, `max_faces` and `max_edge_length`
-    refine faces only where that is needed, by up to MAX_LEVELS levels whatever `levels` are;
-    `polygons` joins triangles of a glTF;
+    vertices on the limit surface, with its normals; `tolerance`, `angle`, `max_faces` and
+    `max_edge_length` refine faces only where that is needed, by up to MAX_LEVELS levels whatever
+    `levels` are; `polygons` joins triangles of a glTF;
     `material` and `group` name the faces to refine (None: all). Raises InvalidParameter.
     """
 
@@ -69,6 +69,7 @@ class Options:
     compress: Compression = "none"
     limit: bool = True
     tolerance: str | None = None
+    angle: float | None = None
     max_faces: int | None = None
     max_edge_length: str | None = None
 
@@ -117,6 +118,9 @@ class Options:
             if not re.fullmatch(LENGTH_PATTERN, given) or float(given.rstrip("%")) <= 0:
                 expected = "must be a length above 0, or a share of the diagonal, as in 0.1%"
                 raise InvalidParameter(name, f"{name} is {given}; it {expected}")
+        if self.angle is not None and not 0 < self.angle < 180:
+            expected = "must be degrees, above 0 and below 180"
+            raise InvalidParameter("angle", f"angle is {self.angle:g}; it {expected}")
         if self.max_faces is not None and self.max_faces < 1:
             raise InvalidParameter(
                 "max_faces", f"max_faces is {self.max_faces}; it must be above 0"
@@ -139,8 +143,14 @@ class Options:
     @property
     def goals(self) -> dict[str, Any]:
         """Goals of faces of several levels, as arguments of the library's refine."""
-        names = ("tolerance", "max_faces", "max_edge_length")
+        names = ("tolerance", "angle", "max_faces", "max_edge_length")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    def faces_after(self, triangles: int) -> int:
+        """Return how many faces triangles become; of a goal the most, or the least if not known."""
+        if self.max_faces is not None:
+            return max(self.max_faces, triangles)
+        return triangles if self.goals else triangles * 4**self.levels
 
     @property
     def learns(self) -> bool:
@@ -167,7 +177,7 @@ class Options:
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
     "levels": f"how fine, 1 to {MAX_LEVELS}: each level makes four faces of one. "
-    "Without effect with tolerance, max_faces or max_edge_length",
+    "Without effect with tolerance, angle, max_faces or max_edge_length",
     "scheme": "the rules. auto and pns: the learned ones; of polygons that the model has no rules "
     "for auto makes quads by Catmull-Clark, and pns triangles. loop: the classic rules for "
     "triangles; polygons are cut. catmull-clark: the classic rules for polygons",
@@ -203,6 +213,8 @@ DESCRIPTIONS = {
     "tolerance": "refine faces only where they may be farther from the limit surface, by up to "
     f"{MAX_LEVELS} levels: a length in the file's units, or as in 0.1% a share of each mesh's "
     "diagonal. Polygons are cut into triangles",
+    "angle": "refine faces only where shading turns over them by more degrees, measured at their "
+    "corners and where finer faces have vertices on their sides; sharp edges apart, as tolerance",
     "max_faces": "most faces of the file: those farthest from the limit surface are refined first. "
     "Of several meshes in a glTF each has the share that it has before",
     "max_edge_length": "refine faces only where their sides are longer; as tolerance",

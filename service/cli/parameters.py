@@ -19,7 +19,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 # Groups of `--help`, in their order. What is in none is for research.
 _EVERYDAY, _FILES, _MORE, _RESEARCH = "Everyday", "Files", "More", "Research"
 _PANELS = {
-    **dict.fromkeys(("output", "levels", "tolerance", "max_faces"), _EVERYDAY),
+    **dict.fromkeys(("output", "levels", "tolerance", "angle", "max_faces"), _EVERYDAY),
     **dict.fromkeys(("max_edge_length", "crease", "scheme", "limit", "normals"), _EVERYDAY),
     **dict.fromkeys(("to", "read_as", "force", "compress", "report", "dry_run"), _FILES),
     **dict.fromkeys(("uv", "weld", "weld_tolerance", "border", "polygons"), _MORE),
@@ -34,6 +34,7 @@ _METAVARS = {
     "material": "NAME",
     "group": "NAME",
     "tolerance": "X|X%",
+    "angle": "DEG",
     "max_faces": "N",
     "max_edge_length": "X|X%",
 }

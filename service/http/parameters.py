@@ -55,6 +55,7 @@ _TYPES = get_type_hints(Options) | {
     "weld_tolerance": Annotated[float, Field(ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)],
     "material": _NAME,
     "tolerance": _LENGTH,
+    "angle": _optional(float, gt=0, lt=180),
     "max_faces": _optional(int, ge=1),
     "max_edge_length": _LENGTH,
     "group": _NAME,

@@ -317,24 +317,35 @@ def _taken(
 
 
 def predicted_faces(
-    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles
-) -> int:
-    """Return how many faces the refined file will have, found without refining.
+    data: bytes,
+    kind: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    siblings: SiblingFiles,
+) -> tuple[int, int]:
+    """Return how many faces a file has, and how many the refined one will have.
+
+    With a goal they are refined and counted, and nothing is written; else they are known before.
 
     Raises:
-        ServiceError: the file cannot be used, or would be over a limit; or a goal is given.
+        ServiceError, PnsError: the file cannot be used, or would be over a limit.
     """
-    if options.goals:
-        raise InvalidParameter(
-            "dry_run",
-            f"how many faces {', '.join(options.goals)} gives is known when they are made",
-        )
     if kind in GLTF_KINDS:
-        upload = read_upload(data, kind, options.levels, limits, siblings)
-        return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
+        if options.goals:
+            asked = options, model, limits, Stages(), siblings
+            scene = refine_scene(data, kind, *asked, check=lambda upload: None)
+            return scene.faces_in, scene.report["totals"]["faces"]
+        upload = read_upload(data, kind, options.faces_after, limits, siblings)
+        faces = sum(mesh.faces for mesh in upload.plans)
+        return faces, options.faces_after(faces)
     mesh = read_within(data, kind, limits)
+    if options.goals:
+        taken, scheme = _taken(mesh, options, model, limits)
+        _, report = refine_mesh_file(taken, scheme, options, limits)
+        return len(mesh.sizes), report["totals"]["faces"]
     check_cost(mesh, options, limits)
-    return faces_after(mesh, options.levels)
+    return len(mesh.sizes), faces_after(mesh, options)
 
 
 def _kind(name: str, path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Refined primitives of faces of several levels: ``tolerance``, ``max_faces``, ``max_edge_length``.
+"""Refined primitives of faces of several levels: ``tolerance``, ``max_faces`` and other goals.
 
 Values of corners are blended linearly in each face of the control mesh. Skins and morph targets
 follow the vertices' masks. Normals are those of the limit surface; where the file's part, on each
@@ -35,6 +35,8 @@ from .normals import safe_unit
 
 # Blended normals that differ by less are of one smooth side.
 SAME_SIDE = 1e-4
+# Shares of a primitive's time after which corners are weighed, joined, and have normals.
+WEIGHED, JOINED, SHADED = 0.25, 0.7, 0.9
 
 
 def refine_to_goal(
@@ -47,7 +49,7 @@ def refine_to_goal(
     stages: Stages,
     *,
     traced: bool,
-) -> tuple[RefinedMesh, list[RefinedPrimitive]]:
+) -> tuple[AdaptiveRefinement, RefinedMesh]:
     """Refine a control mesh that has faces until the options' goal is reached.
 
     Raises:
@@ -57,7 +59,7 @@ def refine_to_goal(
     """
 
     def watch(done: int, total: int) -> None:
-        _check_faces(total if done else total // 2, limits)
+        _check_faces(done, limits)
         stages.reach(done / total)
 
     try:
@@ -80,7 +82,7 @@ def refine_to_goal(
     except ParameterError as error:
         raise InvalidParameter(error.name, str(error)) from error
     skin_and_morph, cut, lost = carried_skin_and_morph(control, made, stages)
-    refined = RefinedMesh(
+    return made, RefinedMesh(
         made.mesh,
         [made.report],
         skin_and_morph,
@@ -91,12 +93,18 @@ def refine_to_goal(
         made.parents if traced else None,
         made.control.topology,
     )
-    ends = slices(control.kept_counts)
-    return refined, [
-        _primitive(control, number, rows, made, refined)
-        for number, rows in enumerate(ends)
-        if rows.stop > rows.start
-    ]
+
+
+def primitives_of(
+    control: ControlMesh, made: AdaptiveRefinement, refined: RefinedMesh, stages: Stages
+) -> list[RefinedPrimitive]:
+    """Return the refined primitives of a control mesh."""
+    ends, primitives = slices(control.kept_counts), list[RefinedPrimitive]()
+    for number, rows in enumerate(ends):
+        with stages.part(number / len(ends), (number + 1) / len(ends)):
+            if rows.stop > rows.start:
+                primitives.append(_primitive(control, number, rows, made, refined, stages))
+    return primitives
 
 
 def _check_faces(count: int, limits: Limits) -> None:
@@ -110,6 +118,7 @@ def _primitive(
     kept: slice,
     made: AdaptiveRefinement,
     refined: RefinedMesh,
+    stages: Stages,
 ) -> RefinedPrimitive:
     primitive = control.primitives[number]
     before = primitive.corners[control.kept[number]]
@@ -123,16 +132,19 @@ def _primitive(
     match = (place[:, :, None] == own[:, None, :]).argmax(axis=2)
     turned = (match[:, 1] - match[:, 0]) % 3 == 2
     weights = np.take_along_axis(made.weights[faces], match[of_kept][:, None, :], axis=2)
+    stages.reach(WEIGHED)
     vertices = made.mesh.faces[faces]
     over = turned[of_kept]
     weights[over], vertices[over] = weights[over][:, ::-1], vertices[over][:, ::-1]
     # Facing the other way, a face's corners are taken backwards.
     split = join_corners(vertices, corners[of_kept], weights)
+    stages.reach(JOINED)
     blend, vertex = split.blend, split.vertex
     normals = None
     if "NORMAL" in primitive.attributes:
         old = primitive.attributes["NORMAL"][row].astype(np.float64)
         normals = _normals(split, safe_unit(blend.linear(old)), made)
+    stages.reach(SHADED)
     blocks = Blocks(available_threads())
     positions = (
         made.mesh.vertices[vertex]

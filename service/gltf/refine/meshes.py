@@ -23,7 +23,7 @@ from ...stages import Stages
 from ..read.plan import MeshPlan
 from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
-from .adaptive import refine_to_goal
+from .adaptive import primitives_of, refine_to_goal
 from .attributes import RefinedPrimitive, refined_primitives
 from .batch import MeshOutcome, StageShares, kind_of, refine_batch
 from .changes import (
@@ -53,6 +53,8 @@ GROUP_FACES = 2**17
 # Costs of stages for each refined face, where refining by Loop with its report costs 1. Measured
 # on a part of 2,000 faces with normals and texture coordinates at four and five levels.
 READ, WELD, LIMIT, ATTRIBUTES = 0.05, 0.05, 2.0, 1.7
+# The same with a goal, by Loop; what is learned adds to the first.
+GOAL, GOAL_ATTRIBUTES = 12.0, 8.0
 WRITE = {"none": 0.1, "meshopt": 2.5, "draco": 25.0}
 
 
@@ -105,10 +107,16 @@ def mostly_polygons(upload: Upload) -> bool:
 
 def stage_shares(scheme: Scheme, options: Options) -> StageShares:
     """Return where the stages of a mesh begin, by their measured costs."""
+    if options.goals:
+        return _shares(GOAL, GOAL_ATTRIBUTES, options)
     made = [4**level for level in range(1, options.levels + 1)]
     learned = made if scheme.learned_levels is None else made[: scheme.learned_levels]
     refine = 1 + LEARNED_COST * sum(learned) / sum(made) + LIMIT * options.limit
-    costs = [READ, WELD, refine, ATTRIBUTES, WRITE[options.compress]]
+    return _shares(refine, ATTRIBUTES, options)
+
+
+def _shares(refine: float, attributes: float, options: Options) -> StageShares:
+    costs = [READ, WELD, refine, attributes, WRITE[options.compress]]
     return StageShares(*(end / sum(costs) for end in list(accumulate(costs))[:-1]))
 
 
@@ -240,16 +248,18 @@ def refine_alone(
         if options.normals != "keep" and not control.is_empty:
             primitives = with_smooth_normals(control, sharp_after(creases, options.levels))
             control = control.with_new_normals(primitives)
-    pointer, made = f"/meshes/{plan.mesh}", None
+    pointer, made, adaptive = f"/meshes/{plan.mesh}", None, None
     refined: list[RefinedPrimitive] = []
     with stages.stage("refine", shares.refine, shares.attributes):
         if not control.is_empty and options.goals:
             asked = control, creases, scheme, options, limits or Limits(), pointer, stages
-            made, refined = refine_to_goal(*asked, traced=traced)
+            adaptive, made = refine_to_goal(*asked, traced=traced)
         elif not control.is_empty:
             made = refined_mesh(control, creases, scheme, options, pointer, stages, traced=traced)
     with stages.stage("attributes", shares.attributes, shares.write):
-        if made is not None and not options.goals:
+        if made is not None and adaptive is not None:
+            refined = primitives_of(control, adaptive, made, stages)
+        elif made is not None:
             grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
             cut = None if chosen is None else cut_faces(control, chosen)
             if control.polygons is not None:

@@ -28,6 +28,9 @@ def change(code, what, count=1, pointer="/meshes/0"):
     return {"pointer": pointer, "code": code, "what": what, "count": count}
 
 
+SECOND = "/meshes/0/primitives/1"
+
+
 def test_vertices_that_no_refined_face_uses_are_counted_once():
     # Two primitives share the positions; neither uses the last two, one of which is degenerate.
     shape = octahedron()

@@ -38,8 +38,9 @@ class Choice:
     ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
     none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
     card asks for it. ``border`` is the rule of boundaries, as in ``pns_common.Creases``.
-    ``uv_keep`` is what stays linear of UV maps. ``tolerance`` (as of ``pns_common.refine``) or
-    ``max_faces`` make faces only where the surface bends, and ``levels`` has no effect.
+    ``uv_keep`` is what stays linear of UV maps. ``tolerance``, ``angle``
+    or ``max_faces`` (as of ``pns_common.refine``) make faces only where the surface bends, and
+    ``levels`` has no effect.
     """
 
     model: Model | None
@@ -51,12 +52,13 @@ class Choice:
     border: str = "smooth"
     uv_keep: Linear = "boundaries"
     tolerance: str | None = None
+    angle: float | None = None
     max_faces: int | None = None
 
     @property
     def goals(self) -> dict[str, Any]:
         """Goals of faces of several levels, as arguments of the library's refine."""
-        given = {"tolerance": self.tolerance, "max_faces": self.max_faces}
+        given = {name: getattr(self, name) for name in ("tolerance", "angle", "max_faces")}
         return {name: goal for name, goal in given.items() if goal is not None}
 
 
