@@ -160,7 +160,7 @@ def beginning(connection):
 
 
 def answers(address, clients):
-    """How answers begin to uploads of clients that are all open at once, the last one first."""
+    """Return the beginnings of answers to uploads that are all open at once, the last one first."""
     with ExitStack() as stack:
         held = []
         for client in clients:

@@ -95,7 +95,7 @@ def test_a_misspelt_setting_is_refused(name, text, monkeypatch):
 
 @pytest.mark.parametrize(("name", "passes"), [("FOO", True), ("BODDY", False), ("JOB_FOO", False)])
 def test_another_programs_variable_passes_where_it_is_said_to(name, passes, monkeypatch):
-    """What resembles a setting never does."""
+    """A name that resembles a setting never does."""
     monkeypatch.setenv("PNS_IGNORE_UNKNOWN", "1")
     monkeypatch.setenv(f"PNS_{name}", "1")
     if passes:

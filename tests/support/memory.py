@@ -4,7 +4,7 @@ import tracemalloc
 
 
 def most_of(work, *arguments, **named):
-    """What the work returns, and the most bytes that it held meanwhile."""
+    """Return the result of some work, and the most bytes that it held meanwhile."""
     tracemalloc.start()
     try:
         made = work(*arguments, **named)

@@ -1,4 +1,4 @@
-"""Who may ask: clients by address behind proxies and by key, what they share, and other origins."""
+"""Access: clients by address behind proxies and by key, their shares, and other origins."""
 
 import asyncio
 import http.client
@@ -30,7 +30,7 @@ from tests.support.live import GLB, local, obeying, served
 
 
 def clients_in(caplog):
-    """Who asked, by the journal."""
+    """Return the clients of all requests in the journal."""
     return [record.fields["client"] for record in caplog.records if record.name == "pns.request"]
 
 

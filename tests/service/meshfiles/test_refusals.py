@@ -50,11 +50,13 @@ WRONG = [
     ("ply", PLY.replace(b"4 0 1 2 3", b"4 0 1 #2 3"), r"line 16 of the PLY file: '#2'"),
     ("ply", PLY.replace(b"4 0 1 2 3", b"-4 0 1 2 3"), "ends after"),
     ("ply", b"OFF\n", "this is not a PLY"),
+    ("ply", PLY.replace(b"format ascii 1.0\n", b""), "names no format that is known"),
     ("stl", bytes(80) + b"\xff\xff\xff\xff", "STL"),
     ("stl", "solid\nfacet\nvertex 0 0 0\nvertex 1 0 x\nvertex 0 1 0\nendsolid\n", "STL"),
     ("stl", b"<html>", "not an STL file: it begins with '<html>'"),
     ("stl", bytes(80) + b"\x09\0\0\0" + bytes(60), "cut off, or is none: it says 9 facets"),
     ("stl", "solid\nfacet\nvertex 0 0 0\n", "cut off: it ends within a facet"),
+    ("stl", "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1", "it ends within a facet"),
     (
         "stl",
         "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nfacet normal 0 0\n",

@@ -99,7 +99,7 @@ def moved(whose):
 
 
 def shared(what, whose):
-    """What a shared accessor says is written as often as it is shared."""
+    """A shared accessor with a long name, which is written as often as it is shared."""
     tree, binary = files.document([octahedron()])
     tree["accessors"][0][what] = "a" * 2**17
     (mesh,) = tree["meshes"]

@@ -1,4 +1,4 @@
-"""What is written once for meshes on the same accessors, sparse, and as narrow as may be."""
+"""Accessors are written once for meshes that share them, sparse, and as narrow as may be."""
 
 import numpy as np
 import pytest
@@ -121,7 +121,7 @@ def test_sparse_targets_move_the_same_vertices_by_the_same(options, tmp_path):
 @pytest.mark.parametrize(("count", "width"), [(3, 2), (65535, 2), (65536, 4), (65537, 4)])
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
 def test_indices_are_narrow_while_none_is_the_largest_of_its_type(count, width, dtype):
-    """Which would restart a primitive."""
+    """The largest would restart a primitive."""
     faces = np.array([[0, 1, count - 1]], dtype=dtype)
     written = as_indices(faces, count)
     assert (written.dtype.kind, written.dtype.itemsize) == ("u", width)
