@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, catmull_clark, loop
 from pns_common.carry.columns import level_topologies
-from pns_common.mesh.quads import split_quads
-from pns_common.mesh.topology import build_topology
+from pns_common.mesh.topology import build_topology, split_quads
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
 from tests.support import opensubdiv

@@ -28,6 +28,7 @@ import pns_common
 
 GENERAL = pns_common.pns(pns_common.load_model())
 FACES, NEAR = {"detail": "FACES", "max_faces": 1000}, {"detail": "TOLERANCE", "tolerance": 0.5}
+TURNED = {"detail": "ANGLE", "angle": np.radians(20)}
 
 
 @pytest.mark.parametrize(
@@ -40,6 +41,7 @@ FACES, NEAR = {"detail": "FACES", "max_faces": 1000}, {"detail": "TOLERANCE", "t
         ({"scheme": "LOOP"}, "loop", {}),
         (FACES | {"scheme": "LOOP"}, "loop", {"max_faces": 1000, "levels": None, "creases": None}),
         (NEAR | {"scheme": "LOOP"}, "loop", {"tolerance": "0.5%", "levels": None, "creases": None}),
+        (TURNED | {"scheme": "LOOP"}, "loop", {"angle": 20, "levels": None, "creases": None}),
     ],
 )
 def test_positions_are_those_of_the_library(settings, scheme, expected):
