@@ -25,7 +25,7 @@ from train.metrics.one_step import Improvement
 from train.models.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from train.models.from_recipe import initial_directed, initial_network
 from train.models.networks import BoundedNet
-from train.models.recipes import general, general_quad, paper
+from train.models.recipes import general, general_quad, paper, signed
 
 
 def dense(activation="gelu", scale=1.0, seed=0):
@@ -98,7 +98,7 @@ def test_a_file_that_differs_is_not_written(tmp_path, monkeypatch, damage):
 
 
 @pytest.mark.parametrize(
-    "recipe", [paper(4), general(4), general_quad(4)], ids=lambda recipe: recipe.name
+    "recipe", [paper(4), signed(4), general(4), general_quad(4)], ids=lambda recipe: recipe.name
 )
 def test_a_card_holds_the_whole_recipe(tmp_path, recipe):
     metrics = {"ridge-held-out": {"distance": {"percent": 12.0}}}
