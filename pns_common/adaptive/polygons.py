@@ -371,5 +371,9 @@ def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.n
     size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
     keys, asked = names[:, 0] * size + names[:, 1], wanted[0] * size + wanted[1]
     order = np.argsort(keys, kind="stable")
-    at = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
-    return np.where(keys[at] == asked, at, -1)
+    at: Integer[np.ndarray, " N"] = order[
+        np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)
+    ]
+    made = at.copy()
+    made[keys[at] != asked] = -1
+    return made
