@@ -369,11 +369,10 @@ def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.n
     names = np.sort(part.names[part.topology.edges.astype(np.int64)], axis=1)
     wanted = np.sort(ends, axis=0)
     size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
-    keys, asked = names[:, 0] * size + names[:, 1], wanted[0] * size + wanted[1]
+    keys: Integer[np.ndarray, " E"] = names[:, 0] * size + names[:, 1]
+    asked = wanted[0] * size + wanted[1]
     order = np.argsort(keys, kind="stable")
-    at: Integer[np.ndarray, " N"] = order[
-        np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)
-    ]
+    at = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
     made = at.copy()
     made[keys[at] != asked] = -1
     return made
