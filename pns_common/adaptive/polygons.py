@@ -367,12 +367,11 @@ def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " 
 def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.ndarray, " N"]:
     """Return the edges of a part between named vertices; −1 where there is none."""
     names = np.sort(part.names[part.topology.edges.astype(np.int64)], axis=1)
-    wanted = np.sort(ends, axis=0)
+    wanted: Integer[np.ndarray, "2 N"] = np.sort(ends, axis=0)
     size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
     keys: Integer[np.ndarray, " E"] = names[:, 0] * size + names[:, 1]
-    asked = wanted[0] * size + wanted[1]
+    asked: Integer[np.ndarray, " N"] = wanted[0] * size + wanted[1]
     order = np.argsort(keys, kind="stable")
-    at = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
-    made = at.copy()
-    made[keys[at] != asked] = -1
-    return made
+    there: Integer[np.ndarray, " N"] = np.searchsorted(keys, asked, sorter=order)
+    at = order[np.minimum(there, len(keys) - 1)]
+    return np.where(np.equal(keys[at], asked), at, -1)
