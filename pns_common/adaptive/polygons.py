@@ -9,6 +9,7 @@ vertices on its sides: where it is flat enough it takes them as corners, so lids
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from functools import cache
 
@@ -27,7 +28,7 @@ from pns_common.adaptive.quad_certificate import (
     planes,
     ragged,
 )
-from pns_common.adaptive.tree import Flags, Layer, Measured, Start, Tree
+from pns_common.adaptive.tree import Flags, Layer, Measures, Start, Tree
 from pns_common.kernels import connectivity
 from pns_common.mesh.creases import edge_cosines
 from pns_common.mesh.rows import dot, marked
@@ -260,29 +261,22 @@ class PolygonStart(Start):
     """The start of trees of polygons."""
 
     tree = PolygonTree
+    # A side's error goes to one of the two faces at it, so all are looked at.
+    together = sys.maxsize
 
-    def _measured(
+    def _measure_some(
         self,
         part: Part,
         places: Float[np.ndarray, "P 3"],
         finer: Part | None,
-        known: Measured | None,
-    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]:
+        rows: Integer[np.ndarray, " N"],
+        to: Measures,
+    ) -> None:
+        (errors, slabs, turns), new = to, rows
         mesh, enough = part.topology, self.goal.tolerance or 0.0
-        count, steps, rows = mesh.face_count, DEEPER - (finer is not None), part.exists.nonzero()[0]
-        made = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
-        errors, slabs, turns = made
-        fresh = np.ones(len(rows), dtype=bool)
-        if known is not None and len(known.codes):
-            codes = part.codes[rows]
-            there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
-            fresh = known.codes[there] != codes
-            errors[rows[~fresh]], slabs[rows[~fresh]] = (
-                of[there[~fresh]] for of in (known.errors, known.slabs)
-            )
-        new = rows[fresh]
-        if len(new) == 0:
-            return made
+        steps, rows = DEEPER - (finer is not None), np.flatnonzero(part.exists)
+        asked = marked(new, mesh.face_count)
+        fresh = asked[rows]
         corners, counts = padded(mesh, rows)
         points = places[part.names[mesh.corners[corners]]]
         frames = planes(points, counts)
@@ -296,13 +290,10 @@ class PolygonStart(Start):
         flat = np.maximum(
             slabs[rows, HIGH] - heights.min(axis=1), heights.max(axis=1) - slabs[rows, LOW]
         )
-        asked = marked(new, count)
-        slabs[new, SIDE] = self._side_distances(
-            part, places, finer, rows, flat, frames, steps, asked
-        )[new]
+        sides = self._side_distances(part, places, finer, rows, flat, frames, steps, asked)
+        slabs[new, SIDE] = sides[new]
         distance = np.maximum(flat[fresh], slabs[new, SIDE])
         errors[new] = self.goal.errors(distance, turns[new], points[fresh])
-        return made
 
     def _side_distances(
         self,
@@ -366,11 +357,12 @@ def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " 
 
 def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.ndarray, " N"]:
     """Return the edges of a part between named vertices; −1 where there is none."""
-    edges: Integer[np.ndarray, "E 2"] = part.names[part.topology.edges.astype(np.int64)]
-    names = np.sort(edges, axis=1)
-    wanted = np.sort(ends, axis=0)
+    names = np.sort(part.names[part.topology.edges.astype(np.int64)], axis=1)
+    wanted: Integer[np.ndarray, "2 N"] = np.sort(ends, axis=0)
     size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
-    keys, asked = names[:, 0] * size + names[:, 1], wanted[0] * size + wanted[1]
+    keys: Integer[np.ndarray, " E"] = names[:, 0] * size + names[:, 1]
+    asked: Integer[np.ndarray, " N"] = wanted[0] * size + wanted[1]
     order = np.argsort(keys, kind="stable")
-    at = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
-    return np.where(keys[at] == asked, at, -1)
+    there: Integer[np.ndarray, " N"] = np.searchsorted(keys, asked, sorter=order)
+    at = order[np.minimum(there, len(keys) - 1)]
+    return np.where(np.equal(keys[at], asked), at, -1)

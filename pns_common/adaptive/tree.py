@@ -34,6 +34,7 @@ from pns_common.mesh.topology import Topology
 TOGETHER = 2**16
 # Errors that agree in so many digits are equal.
 DIGITS = 9
+Measures = tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]]
 Flags = Sequence[Bool[np.ndarray, " _"]]
 Codes = Sequence[Integer[np.ndarray, " _"]]
 
@@ -233,6 +234,7 @@ class Start:
     goal: Goal
     tell: Callable[[float, int], None]
     tree: ClassVar[type[Tree]] = Tree
+    together: ClassVar[int] = TOGETHER
 
     def grow(
         self,
@@ -308,14 +310,14 @@ class Start:
         places: Float[np.ndarray, "N 3"],
         finer: Part | None,
         known: Measured | None,
-        to: tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]],
+        to: Measures,
     ) -> Iterator[Integer[np.ndarray, " N"]]:
         """Write errors, slabs and turns of faces that exist; yield which, as they are written.
 
         They are measured on those of the next level if it is given. Those that are known are not
         measured again.
         """
-        (errors, widths, turned), rows = to, np.flatnonzero(part.exists)
+        rows = np.flatnonzero(part.exists)
         if known is not None and len(known.codes):
             codes = part.codes[rows]
             there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
@@ -325,17 +327,28 @@ class Start:
             if same.any():
                 yield rows[same]
             rows = rows[~same]
-        folds, enough = folded(part), self.goal.tolerance or 0.0
-        for begin in range(0, len(rows), TOGETHER):
-            some = rows[begin : begin + TOGETHER]
-            triangles, deeper = places[part.names[part.topology.faces[some]]], finer is not None
-            of_finer = CHILDREN * some[:, None] + np.arange(CHILDREN) if deeper else some
-            asked = triangles, folds[some], self.levels, int(deeper), enough
-            widths[some] = slabs(finer or part, of_finer, *asked)
-            if self.goal.angle is not None:
-                turned[some] = turns(part, finer, some, self.levels)
-            errors[some] = self.goal.errors(distances(widths[some]), turned[some], triangles)
+        for begin in range(0, len(rows), self.together):
+            some = rows[begin : begin + self.together]
+            self._measure_some(part, places, finer, some, to)
             yield some
+
+    def _measure_some(
+        self,
+        part: Part,
+        places: Float[np.ndarray, "N 3"],
+        finer: Part | None,
+        rows: Integer[np.ndarray, " N"],
+        to: Measures,
+    ) -> None:
+        """Write errors, slabs and turns of some faces that exist."""
+        errors, widths, turned = to
+        triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
+        of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
+        asked = triangles, folded(part)[rows], self.levels, int(deeper), self.goal.tolerance or 0.0
+        widths[rows] = slabs(finer or part, of_finer, *asked)
+        if self.goal.angle is not None:
+            turned[rows] = turns(part, finer, rows, self.levels)
+        errors[rows] = self.goal.errors(distances(widths[rows]), turned[rows], triangles)
 
     def _expected(self, errors: Float[np.ndarray, " N"], depth: int) -> float:
         """Return into how many faces some are going to be split, if four of one quarter errors."""
