@@ -11,9 +11,8 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
 from pns_common.mesh.normals import face_normals
-from pns_common.mesh.quads import quad_faces
 from pns_common.mesh.rows import dot
-from pns_common.mesh.topology import EdgeClass, Topology, split_faces
+from pns_common.mesh.topology import EdgeClass, Topology, quad_faces, split_faces
 from pns_common.operator.formula import Additions
 from pns_common.parallel import Blocks
 
@@ -107,16 +106,19 @@ class AdaptiveReport(TypedDict):
 
     ``faces_by_level`` counts faces by how often the control face was split, and ``distance_max`` is
     the largest bound of a face's distance from the limit surface: above ``tolerance`` only where
-    the deepest level did not suffice, or ``max_faces`` ended it.
+    the deepest level did not suffice, or ``max_faces`` ended it. ``angle_max`` is the largest
+    measured angle between normals of a face, in degrees; None where no angle was asked for.
     """
 
     tolerance: float | None
+    angle: float | None
     max_edge_length: float | None
     max_faces: int | None
     vertices: int
     faces: int
     faces_by_level: list[int]
     distance_max: float
+    angle_max: float | None
 
 
 class Report(LimitDistances):

@@ -21,8 +21,6 @@ from pns_common.kernels.loop import MIDPOINT
 EDGE_SHARE = 1 / 4
 # A vertex of fewer corners than this stays: the smooth rule has a negative weight there.
 LEAST_CORNERS = 2
-# A neighbour's weight in the limit mask, in units of an opposite corner's.
-LIMIT_EDGE = 4
 
 
 @kernel
@@ -80,30 +78,33 @@ def sum_corners(
     at_faces: f8_2d,
     mesh: Connectivity,
     reach: i8_2d,
+    at_edges: bool,
+    weight: float,
     sums: f8_2d,
     counts: i4_1d,
 ):
     """Sum over the corners at vertices begin … end − 1; write how many there are.
 
-    A corner adds its face's vertex, and half of both neighbours along its face. ``reach`` is that
-    of blocks of 3 × SKIPPED_ROWS corners.
+    A corner adds its face's vertex, and ``weight`` times both neighbours along its face: vertices,
+    or those of edges if ``at_edges``. ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
     """
-    corners = mesh.corners
     for v in range(max(begin, 0), end):
         counts[v] = 0
         for k in range(3):
             sums[v, k] = 0.0
+    beside = mesh.corner_edges if at_edges else mesh.corners
     for block in range(reach.shape[0]):
-        first, stop = rows_of_block(reach, block, 3 * SKIPPED_ROWS, len(corners), begin, end)
+        first, stop = rows_of_block(reach, block, 3 * SKIPPED_ROWS, len(beside), begin, end)
         for h in range(first, stop):
-            v = corners[h]
+            v = mesh.corners[h]
             if not begin <= v < end:
                 continue
-            a, b = corners[preceding_corner(mesh, h)], corners[following_corner(mesh, h)]
+            a = beside[preceding_corner(mesh, h)]
+            b = beside[h if at_edges else following_corner(mesh, h)]
             f = face_of(mesh, h)
             counts[v] += 1
             for k in range(3):
-                sums[v, k] += MIDPOINT * (points[a, k] + points[b, k]) + at_faces[f, k]
+                sums[v, k] += weight * (points[a, k] + points[b, k]) + at_faces[f, k]
 
 
 @kernel
@@ -116,35 +117,3 @@ def blend_corners(begin: int, end: int, points: f8_2d, counts: i4_1d, sums: f8_2
                 sums[v, k] = points[v, k]
             else:
                 sums[v, k] = ((count - 2) * points[v, k] + sums[v, k] / count) / count
-
-
-@kernel
-def sum_limit_corners(
-    begin: int, end: int, placed: f8_2d, mesh: Connectivity, reach: i8_2d, sums: f8_2d
-):
-    """Write k² p + 4 Σ e_j + Σ d_j, over its sum k (k + 5), of vertices begin … end − 1.
-
-    ``placed`` are the vertices of the next mesh, whose faces are quads: old ones, those of edges
-    from row V on, those of faces from row V + E on. Column 3 of ``sums`` is k.
-    """
-    count, corner_edges = mesh.vertex_count, mesh.corner_edges
-    for v in range(max(begin, 0), end):
-        sums[v, 0] = sums[v, 1] = sums[v, 2] = sums[v, 3] = 0.0
-    for block in range(reach.shape[0]):
-        first, stop = rows_of_block(reach, block, 3 * SKIPPED_ROWS, len(corner_edges), begin, end)
-        for h in range(first, stop):
-            v = mesh.corners[h]
-            if not begin <= v < end:
-                continue
-            a, b = count + corner_edges[preceding_corner(mesh, h)], count + corner_edges[h]
-            f = count + mesh.edges.shape[0] + face_of(mesh, h)
-            sums[v, 3] += 1
-            for k in range(3):
-                sums[v, k] += LIMIT_EDGE / 2 * (placed[a, k] + placed[b, k]) + placed[f, k]
-    for v in range(max(begin, 0), end):
-        n = sums[v, 3]
-        for k in range(3):
-            if n < LEAST_CORNERS:
-                sums[v, k] = placed[v, k]
-            else:
-                sums[v, k] = (n * n * placed[v, k] + sums[v, k]) / (n * (n + 5))

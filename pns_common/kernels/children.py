@@ -6,13 +6,7 @@ import math
 
 from pns_common.kernels import Connectivity, b1_1d, f8_1d, f8_2d, inlined, kernel, u4_2d
 from pns_common.kernels.connectivity import INTERIOR, following_corner, triangle_of
-from pns_common.kernels.vectors import (
-    NO_AREA,
-    area_vector,
-    difference,
-    dot,
-    row,
-)
+from pns_common.kernels.vectors import NO_AREA, area_vector, difference, dot, row
 
 # A child that keeps less than this share of its area counts as folded.
 LEAST_AREA = 1e-3

@@ -1,4 +1,4 @@
-"""Edges of a face list, their classes, and fans around vertices.
+"""Edges of a face list, their classes, and steps from corner to corner.
 
 Half-edge h starts at corner h; in triangle meshes corner i of face f is 3 f + i. Edges are numbered
 by first appearance over faces.
@@ -9,17 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from pns_common.kernels import (
-    Connectivity,
     b1_1d,
     i1_1d,
     i4_1d,
     i4_2d,
     i8_1d,
-    i8_2d,
     inlined,
     kernel,
     u4_1d,
-    u4_2d,
 )
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = 0, 1, 2, 3
@@ -108,14 +105,6 @@ def number_edges(
     return count
 
 
-@kernel
-def read_links(begin: int, end: int, low: u4_1d, links: i4_2d, edges: u4_2d, half_edges: i4_2d):
-    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
-    for e in range(max(begin, 0), end):
-        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
-        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
-
-
 @inlined
 def _may_have_twin(corner_edges, links, f):
     """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
@@ -186,7 +175,7 @@ def _in_repeating_face(face_of_corner, repeats, h):
     return repeats[face_of_corner[h] if len(face_of_corner) else triangle_of(h)]
 
 
-# --- fans -----------------------------------------------------------------------------------------
+# --- steps ----------------------------------------------------------------------------------------
 
 
 @inlined
@@ -240,60 +229,13 @@ def preceding_corner(mesh, h):
 
 
 @inlined
-def twin(mesh, h):
-    """Return the other half-edge of an interior or crease edge; −1 at other edges."""
+def opposed(mesh, h):
+    """Return the other half-edge of an interior edge; −1 at other edges."""
     e = mesh.corner_edges[h]
-    if mesh.edge_class[e] == BOUNDARY or mesh.edge_class[e] == IRREGULAR:
+    if mesh.edge_class[e] != INTERIOR:
         return -1
     first = mesh.half_edges[e, 0]
     return mesh.half_edges[e, 1] if first == h else first
-
-
-@kernel
-def count_corners(begin: int, end: int, corners: u4_1d, reach: i8_2d, corner: i4_1d, count: i4_1d):
-    """Write the last corner at each vertex begin … end − 1, and how many there are.
-
-    ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
-    """
-    for v in range(max(begin, 0), end):
-        count[v] = 0
-    for block in range(reach.shape[0]):
-        first, stop = rows_of_block(reach, block, 3 * SKIPPED_ROWS, corners.shape[0], begin, end)
-        for h in range(first, stop):
-            v = corners[h]
-            if begin <= v < end:
-                corner[v] = h
-                count[v] += 1
-
-
-@kernel
-def count_fans(begin: int, end: int, mesh: Connectivity, corner: i4_1d, count: i4_1d, fans: i1_1d):
-    """Write how many fans the corners of vertices begin … end − 1 form: 0, 1, or 2 for more.
-
-    Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
-    """
-    for v in range(max(begin, 0), end):
-        fans[v] = 0
-        if count[v] == 0:
-            continue
-        start = corner[v]
-        seen, h = 1, start
-        while seen <= count[v]:
-            h = twin(mesh, h)
-            if h < 0:
-                break
-            h = following_corner(mesh, h)
-            if h == start:
-                break
-            seen += 1
-        if h < 0:
-            h = start
-            while seen <= count[v]:
-                h = twin(mesh, preceding_corner(mesh, h))
-                if h < 0:
-                    break
-                seen += 1
-        fans[v] = 1 if seen == count[v] else 2
 
 
 @kernel

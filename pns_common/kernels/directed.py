@@ -157,7 +157,7 @@ def directed_features(
             turn = 2 * math.atan2(norm(difference(n, m)), norm(_sum_of(n, m)))
             if c[1] + d[1] > 0:
                 turn = -turn
-        border = 1.0 if mesh.edge_class[e] != INTERIOR else 0.0
+        sharp = 1.0 if mesh.edge_class[e] != INTERIOR else 0.0
         saturated = math.tanh(turn / TURNS[0]), math.tanh(turn / TURNS[1])
         c, d = _soft(c), _soft(d)
         m1, m2 = _local(at_a, t, up, side, 1.0), _local(at_b, t, up, side, 1.0)
@@ -178,7 +178,7 @@ def directed_features(
             _write_turned(features, to, 18, u2 if way == 0 else u1, s)
             _write(features, to, 21, r1 if way == 0 else r2, r2 if way == 0 else r1, sizes[v, 1])
             _write(features, to, 24, sizes[w, 1], sizes[v, 2], sizes[w, 2])
-            features[to, 27] = border
+            features[to, 27] = sharp
 
 
 @inlined
@@ -194,9 +194,9 @@ def _length_ratio(h, log, sizes, v):
 
 @kernel
 def measure_sizes(
-    begin: int, end: int, means: f8_2d, valence: i4_1d, on_border: b1_1d, sizes: f8_2d
+    begin: int, end: int, means: f8_2d, valence: i4_1d, on_boundary: b1_1d, sizes: f8_2d
 ):
-    """Write logarithms of mean length and of valence / 6, and 1 at borders, of some vertices.
+    """Write logarithms of mean length and of valence / 6, and 1 at boundaries, of some vertices.
 
     The first is NO_LOG where there is no length.
     """
@@ -204,7 +204,7 @@ def measure_sizes(
         mean = means[v, LENGTH]
         sizes[v, 0] = math.log(mean) if mean > 0 else NO_LOG
         sizes[v, 1] = math.log(max(valence[v], 1) / 6.0)
-        sizes[v, 2] = 1.0 if on_border[v] else 0.0
+        sizes[v, 2] = 1.0 if on_boundary[v] else 0.0
 
 
 @kernel

@@ -15,15 +15,7 @@ from pns_common.kernels import (
 )
 from pns_common.kernels.connectivity import next_corner, previous_corner, triangle_of
 from pns_common.kernels.measures import HEIGHT
-from pns_common.kernels.vectors import (
-    across,
-    between,
-    cross,
-    divisor,
-    dot,
-    over,
-    row,
-)
+from pns_common.kernels.vectors import across, between, cross, divisor, dot, over, row
 
 # Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε).
 ANTIPARALLEL = 1e-6

@@ -8,31 +8,12 @@ q_k, with d_j the vertex of corner j's face. In a closed sector q_k = q_0.
 
 from __future__ import annotations
 
-from pns_common.kernels import (
-    Connectivity,
-    b1_1d,
-    f8_2d,
-    i4_1d,
-    i8_1d,
-    inlined,
-    kernel,
-    u4_1d,
-)
-from pns_common.kernels.connectivity import INTERIOR, face_of, following_corner, preceding_corner
+from pns_common.kernels import Connectivity, b1_1d, f8_2d, i4_1d, i8_1d, inlined, kernel, u4_1d
+from pns_common.kernels.connectivity import face_of, following_corner, opposed, preceding_corner
 from pns_common.kernels.vectors import between, cross, divisor, dot, norm, over
 
 # Tangents that span less than this, of the product of their lengths, span no plane.
 NO_PLANE = 1e-9
-
-
-@inlined
-def _opposed(mesh, h):
-    """Return the other half-edge of an interior edge; −1 at other edges."""
-    e = mesh.corner_edges[h]
-    if mesh.edge_class[e] != INTERIOR:
-        return -1
-    first = mesh.half_edges[e, 0]
-    return mesh.half_edges[e, 1] if first == h else first
 
 
 @kernel
@@ -60,7 +41,7 @@ def label_sectors(
         for start in range(of_corner.shape[0]):
             if of_corner[start] >= 0:
                 continue
-            if not closed and _opposed(mesh, start) >= 0:
+            if not closed and opposed(mesh, start) >= 0:
                 continue
             h, before, corners = start, start, 0
             while h >= 0 and of_corner[h] < 0:
@@ -76,7 +57,7 @@ def label_sectors(
                     spokes[to] = mesh.corners[following_corner(mesh, h)]
                     to += 1
                 before = preceding_corner(mesh, h)
-                h = _opposed(mesh, before)
+                h = opposed(mesh, before)
             spokes[to] = at_edges + mesh.corner_edges[before] if quads else mesh.corners[before]
             to += 1
             first[count], size[count] = start, corners

@@ -8,16 +8,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import (
-    Connectivity,
-    f8_1d,
-    f8_2d,
-    i4_1d,
-    i8_2d,
-    inlined,
-    kernel,
-    u4_2d,
-)
+from pns_common.kernels import Connectivity, f8_1d, f8_2d, i4_1d, i8_2d, inlined, kernel, u4_2d
 from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, face_of, rows_of_block
 from pns_common.kernels.vectors import (
     NO_AREA,

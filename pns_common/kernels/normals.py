@@ -12,18 +12,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import (
-    Connectivity,
-    b1_2d,
-    f4_2d,
-    f8_2d,
-    i4_2d,
-    i8_1d,
-    i8_2d,
-    inlined,
-    kernel,
-)
-from pns_common.kernels.connectivity import INTERIOR, next_corner
+from pns_common.kernels import b1_2d, f4_2d, f8_2d, i4_2d, i8_2d, inlined, kernel
 from pns_common.kernels.vectors import across, between, cross, divisor, dot, norm, over, row
 
 # Unit vectors whose weighted sum is shorter have no direction to trust.
@@ -169,42 +158,3 @@ def _farthest_axis(normal):
     if z < min(x, y):
         return 0.0, 0.0, 1.0
     return (0.0, 1.0, 0.0) if y < x else (1.0, 0.0, 0.0)
-
-
-@inlined
-def _join(fans, g, h):
-    """Join the fans of two corners; the lower first corner names both."""
-    while fans[g] != g:
-        fans[g] = fans[fans[g]]
-        g = fans[g]
-    while fans[h] != h:
-        fans[h] = fans[fans[h]]
-        h = fans[h]
-    if g < h:
-        fans[h] = g
-    else:
-        fans[g] = h
-
-
-@kernel
-def join_corners(mesh: Connectivity, fans: i8_1d):
-    """Write the fan of each corner (3 F,), numbered by first appearance; return how many.
-
-    Across each interior edge the corners of both faces are joined, at either end.
-    """
-    for h in range(fans.shape[0]):
-        fans[h] = h
-    for e in range(mesh.edges.shape[0]):
-        if mesh.edge_class[e] == INTERIOR:
-            there, back = mesh.half_edges[e, 0], mesh.half_edges[e, 1]
-            _join(fans, there, next_corner(back))
-            _join(fans, next_corner(there), back)
-    # Every corner names an earlier one, which has its fan's number by then, or is its fan's first.
-    count = 0
-    for h in range(fans.shape[0]):
-        if fans[h] == h:
-            fans[h] = count
-            count += 1
-        else:
-            fans[h] = fans[fans[h]]
-    return count

@@ -17,15 +17,7 @@ vertex twice and no two triangles have the same three.
 
 from __future__ import annotations
 
-from pns_common.kernels import (
-    Connectivity,
-    i1_1d,
-    i4_2d,
-    i8_2d,
-    inlined,
-    kernel,
-    u4_2d,
-)
+from pns_common.kernels import Connectivity, i1_1d, i4_2d, i8_2d, inlined, kernel, u4_2d
 from pns_common.kernels.connectivity import INTERIOR, following_corner, triangle_of
 
 QUAD = 4
@@ -106,19 +98,13 @@ def number_halves(begin: int, end: int, mesh: Connectivity, quads: bool, halves:
 
 
 @inlined
-def _half_in_triangles(mesh, h, vertex):
-    """Return the half of a triangle's half-edge that is at ``vertex``."""
-    f = triangle_of(h)
-    i = h - 3 * f
-    if mesh.corners[h] == vertex:
-        return 12 * f + 3 * i
-    return 12 * f + 3 * (i + 1 if i < 2 else 0) + 2
-
-
-@inlined
-def _half_in_quads(mesh, h, vertex):
-    """Return the half of a half-edge that is at ``vertex``, where corners become quads."""
-    return QUAD * h if mesh.corners[h] == vertex else QUAD * following_corner(mesh, h) + 3
+def _half_at(mesh, h, vertex, quads):
+    """Return the half of a half-edge that is at ``vertex``."""
+    starts = mesh.corners[h] == vertex
+    corner = h if starts else following_corner(mesh, h)
+    if quads:
+        return QUAD * corner + (0 if starts else 3)
+    return 3 * (corner + triangle_of(corner)) + (0 if starts else 2)
 
 
 @inlined
@@ -127,62 +113,24 @@ def _write_half(mesh, e, vertex, child, quads, to_edges, to_half_edges, to_class
     to_edges[child, 0], to_edges[child, 1] = vertex, mesh.vertex_count + e
     for side in range(2):
         h = mesh.half_edges[e, side]
-        if h >= 0:
-            here = _half_in_quads(mesh, h, vertex) if quads else _half_in_triangles(mesh, h, vertex)
-            to_half_edges[child, side] = here
-        else:
-            to_half_edges[child, side] = h
+        to_half_edges[child, side] = _half_at(mesh, h, vertex, quads) if h >= 0 else h
     to_class[child] = mesh.edge_class[e]
 
 
 @kernel
-def split_edges_of_triangles(
+def split_edges(
     begin: int,
     end: int,
     mesh: Connectivity,
+    quads: bool,
     halves: u4_2d,
     corner_edges: u4_2d,
     edges: u4_2d,
     half_edges: i4_2d,
     edge_class: i1_1d,
 ):
-    """Write the edges of the children of triangles begin … end − 1."""
-    following = 3 * begin + 2 * _opened_before(mesh, 3 * begin)
-    for f in range(max(begin, 0), end):
-        for i in range(3):
-            before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0
-            leaving, entering = mesh.corner_edges[3 * f + i], mesh.corner_edges[3 * f + before]
-            vertex = mesh.corners[3 * f + i]
-            out_of = halves[leaving, 0 if vertex < mesh.corners[3 * f + after] else 1]
-            into = halves[entering, 0 if vertex < mesh.corners[3 * f + before] else 1]
-            if mesh.half_edges[leaving, 0] == 3 * f + i:
-                _write_half(mesh, leaving, vertex, out_of, False, edges, half_edges, edge_class)
-                following += 1
-            inner = following
-            following += 1
-            if mesh.half_edges[entering, 0] == 3 * f + before:
-                _write_half(mesh, entering, vertex, into, False, edges, half_edges, edge_class)
-                following += 1
-            edges[inner, 0] = mesh.vertex_count + min(leaving, entering)
-            edges[inner, 1] = mesh.vertex_count + max(leaving, entering)
-            half_edges[inner, 0], half_edges[inner, 1] = 12 * f + 3 * i + 1, 12 * f + 9 + before
-            edge_class[inner] = INTERIOR
-            corner_edges[4 * f + i, 0], corner_edges[4 * f + i, 1] = out_of, inner
-            corner_edges[4 * f + i, 2], corner_edges[4 * f + 3, before] = into, inner
-
-
-@kernel
-def split_edges_into_quads(
-    begin: int,
-    end: int,
-    mesh: Connectivity,
-    halves: u4_2d,
-    corner_edges: u4_2d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-):
-    """Write the edges of the quads of faces begin … end − 1."""
+    """Write the edges of the children of faces begin … end − 1; ``quads``: corners become quads."""
+    count, at_faces = mesh.vertex_count, mesh.vertex_count + mesh.edges.shape[0]
     following = mesh.offsets[begin] + 2 * _opened_before(mesh, mesh.offsets[begin])
     for f in range(max(begin, 0), end):
         first, stop = mesh.offsets[f], mesh.offsets[f + 1]
@@ -193,22 +141,31 @@ def split_edges_into_quads(
             out_of = halves[leaving, _end_of(mesh, leaving, vertex)]
             into = halves[entering, _end_of(mesh, entering, vertex)]
             if mesh.half_edges[leaving, 0] == h:
-                _write_half(mesh, leaving, vertex, out_of, True, edges, half_edges, edge_class)
+                _write_half(mesh, leaving, vertex, out_of, quads, edges, half_edges, edge_class)
                 following += 1
-            inner = following if h + 1 < stop else inner_of_last
-            if h == first:
-                inner_of_last = inner_before = following + 1
-                half_edges[inner_of_last, 0] = QUAD * first + 2
-                half_edges[inner_of_last, 1] = QUAD * (stop - 1) + 1
-            if h + 1 < stop:
-                half_edges[inner, 0], half_edges[inner, 1] = QUAD * h + 1, QUAD * (h + 1) + 2
-            following += _inner_edges(h, first, stop, True)
-            edges[inner, 0] = mesh.vertex_count + leaving
-            edges[inner, 1] = mesh.vertex_count + mesh.edges.shape[0] + f
+            inner = following if not quads or h + 1 < stop else inner_of_last
+            if not quads:
+                edges[inner, 0], edges[inner, 1] = (
+                    count + min(leaving, entering),
+                    count + max(leaving, entering),
+                )
+                half_edges[inner, 0] = 3 * (h + f) + 1
+                half_edges[inner, 1] = 12 * f + 9 + before - first
+                corner_edges[h + f, 0], corner_edges[h + f, 1] = out_of, inner
+                corner_edges[h + f, 2], corner_edges[4 * f + 3, before - first] = into, inner
+            else:
+                if h == first:
+                    inner_of_last = inner_before = following + 1
+                    half_edges[inner_of_last, 0] = QUAD * first + 2
+                    half_edges[inner_of_last, 1] = QUAD * (stop - 1) + 1
+                if h + 1 < stop:
+                    half_edges[inner, 0], half_edges[inner, 1] = QUAD * h + 1, QUAD * (h + 1) + 2
+                edges[inner, 0], edges[inner, 1] = count + leaving, at_faces + f
+                corner_edges[h, 0], corner_edges[h, 1] = out_of, inner
+                corner_edges[h, 2], corner_edges[h, 3] = inner_before, into
+                inner_before = inner
             edge_class[inner] = INTERIOR
+            following += _inner_edges(h, first, stop, quads)
             if mesh.half_edges[entering, 0] == before:
-                _write_half(mesh, entering, vertex, into, True, edges, half_edges, edge_class)
+                _write_half(mesh, entering, vertex, into, quads, edges, half_edges, edge_class)
                 following += 1
-            corner_edges[h, 0], corner_edges[h, 1] = out_of, inner
-            corner_edges[h, 2], corner_edges[h, 3] = inner_before, into
-            inner_before = inner

@@ -7,6 +7,8 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
+from pns_common.mesh.rows import number_by_first_appearance
+from pns_common.mesh.sectors import find_sectors
 from pns_common.mesh.topology import TRIANGLE, Topology, build_topology
 from pns_common.parallel import Blocks
 
@@ -101,9 +103,8 @@ def smooth_fans(
     topology = build_topology(faces, vertex_count)
     if creases is not None:
         topology = topology.with_creases(topology.rows_of(creases))
-    fans = np.empty(3 * len(faces), dtype=np.int64)
-    kernels.join_corners(topology.connectivity, fans)
-    return fans.reshape(-1, 3)
+    around = find_sectors(topology.connectivity)
+    return number_by_first_appearance(around.of_corner)[0].reshape(-1, TRIANGLE)
 
 
 def perpendicular_tangents(

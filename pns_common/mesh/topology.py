@@ -1,4 +1,4 @@
-"""Connectivity of a mesh: edges, edge classes and sharpness, fans; the split into triangles.
+"""Connectivity of a mesh: edges, edge classes and sharpness, fans; splits of its faces.
 
 Nothing here knows positions. The orders are part of the result: edges are numbered by first
 appearance over the faces, (a, b), (b, c), … from each face's first corner on.
@@ -17,6 +17,7 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.kernels import Connectivity, loop, split
 from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
+from pns_common.mesh.sectors import find_sectors
 from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
@@ -265,18 +266,15 @@ class Topology:
         return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
+    def fan_count(self) -> Integer[np.ndarray, " V"]:
+        """Number of fans that the faces of each vertex form; creases divide none."""
+        around = find_sectors(self.without_creases().connectivity)
+        return np.bincount(around.vertex, minlength=self.vertex_count)
+
+    @property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
         """True for vertices whose faces form more than one fan, as at the knot of a bow-tie."""
-        return self.count_fans(Blocks()) > 1
-
-    def count_fans(self, blocks: Blocks) -> Integer[np.ndarray, " V"]:
-        """Return how many fans the faces of each vertex form: 0, 1, or 2 for more."""
-        corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
-        fans = np.empty(self.vertex_count, dtype=np.int8)
-        around = self.corners, self.corner_reach, corner, count
-        blocks.owners(len(fans)).run(len(fans), kernels.count_corners, *around)
-        blocks.run(len(fans), kernels.count_fans, self.connectivity, corner, count, fans)
-        return fans
+        return self.fan_count > 1
 
     def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
@@ -388,15 +386,13 @@ class Topology:
         """Return a copy without soft edges and learned corners: what a user or a file marks."""
         return replace(self, soft=NO_WEIGHTS, soft_corners=NO_WEIGHTS)
 
-    def rows_of(
-        self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
-    ) -> Integer[np.ndarray, " N"]:
+    def rows_of(self, pairs: Integer[np.ndarray, "N 2"]) -> Integer[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
-            ParameterError: a pair is no edge; ``name`` is the argument's.
+            ParameterError: a pair is no edge.
         """
-        check_vertices(name, pairs, self.vertex_count)
+        check_vertices("creases", pairs, self.vertex_count)
         named = marked(pairs, self.vertex_count)
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
         keys, asked = (_keys(ends, self.vertex_count) for ends in (self.edges[near], pairs))
@@ -406,9 +402,8 @@ class Topology:
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(
-                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
-            )
+            pair = pairs[row].tolist()
+            raise ParameterError(f"creases[{row}]", pair, expected="an edge of the mesh")
         return near[order[place]]
 
 
@@ -442,7 +437,7 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
     repeats, repeating = np.zeros(0, dtype=bool), False
     if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
@@ -509,9 +504,8 @@ def split_into(
     count += 2 * edge_count
     edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
     edge_class, soft = np.empty(count, np.int8), NO_WEIGHTS
-    write = split.split_edges_into_quads if quads else split.split_edges_of_triangles
     to = corner_edges, edges, half_edges, edge_class
-    blocks.run(parent.face_count, write, read, halves, *to)
+    blocks.run(parent.face_count, split.split_edges, read, quads, halves, *to)
     if inherit and len(parent.soft):
         rows, soft = np.flatnonzero(parent.soft), np.zeros(count)
         soft[halves[rows]] = parent.soft[rows, None]
@@ -537,6 +531,25 @@ def split_faces(
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
     faces = np.empty((4 * len(parent.faces), TRIANGLE), dtype=dtype)
     blocks.run(parent.face_count, split.split_triangles, parent.connectivity, faces)
+    return faces
+
+
+def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> Topology:
+    """Return the topology of the split of faces of any degree into a quad for each corner.
+
+    The vertex of edge e is V + e, that of face f is V + E + f. The quad of corner h is (its vertex,
+    the vertex of the edge that leaves it, the face's vertex, that of the edge that enters it), and
+    it is face h of the refined mesh. Arguments are as of ``split_triangles``.
+    """
+    return split_into(quad_faces(parent, blocks), parent, blocks, inherit=inherit)
+
+
+def quad_faces(
+    parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
+) -> Integer[np.ndarray, "H 4"]:
+    """Return the quads of the split, in the order of ``split_quads``."""
+    faces = np.empty((len(parent.corners), QUAD), dtype=dtype)
+    blocks.run(parent.face_count, split.split_into_quads, parent.connectivity, faces)
     return faces
 
 
@@ -567,10 +580,7 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"],
-    offsets: Integer[np.ndarray, " F1"],
-    vertex_count: int,
-    blocks: Blocks,
+    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -582,8 +592,9 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
-    blocks.quiet().run(made, kernels.read_links, low, links, edges, half_edges)
+    edges, links = np.empty((made, 2), np.uint32), links[:made]
+    edges[:, 0], edges[:, 1] = low[:made], links[:, kernels.HIGH]
+    half_edges = np.ascontiguousarray(links[:, kernels.FIRST :])
     return edges, half_edges, corner_edges, bool(plain[0])
 
 

@@ -87,8 +87,8 @@ def _sizes(level: Level) -> Float[np.ndarray, "V 3"]:
     kept = vars(level)
     if "sizes" not in kept:
         sizes, counts = np.empty((len(level.points), 3)), level.topology.sharp_count
-        on_border = counts > 0 if len(counts) else np.zeros(len(sizes), dtype=bool)
-        read = level.rings.means, level.rings.valence, on_border
+        on_boundary = counts > 0 if len(counts) else np.zeros(len(sizes), dtype=bool)
+        read = level.rings.means, level.rings.valence, on_boundary
         level.blocks.quiet().run(len(sizes), kernels.measure_sizes, *read, sizes)
         kept["sizes"] = sizes
     return kept["sizes"]

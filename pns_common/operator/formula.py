@@ -131,19 +131,19 @@ class PaperRule:
         mesh, count = level.topology, len(level.points)
         x = level.base.place(level.points, mesh, level.blocks)  # x0
         level.measure(rings=self.seen.rings)
-        made = np.zeros((len(x), 3)), *np.zeros((3, len(x)))  # δ, ‖δ‖ / ρ, γ, ρ
+        delta, (ratio, gate, bound) = np.zeros((len(x), 3)), np.zeros((3, len(x)))
 
         def correct(begin: int, end: int) -> int:
             at = edge_inputs(level, self, mesh.interior[begin:end])
             read = at.rows, count, answers(self.network, at), at.basis, at.gate, at.bound
-            correction.correct_by_equation_1(*read, *made)
+            correction.correct_by_equation_1(*read, delta, ratio, gate, bound)
             return int(at.degenerate.sum())
 
         blocks = level.blocks.of_rows(NETWORK_ROWS)
         degenerate = sum(blocks.run(len(mesh.interior), correct))
         base_points = x.copy()
-        x += made[0]
-        return Additions(x, base_points, *made, None, degenerate, None)
+        x += delta
+        return Additions(x, base_points, delta, ratio, gate, bound, None, degenerate, None)
 
 
 def edge_inputs(level: Level, rule: PaperRule, rows: Integer[np.ndarray, " N"]) -> Inputs:

@@ -139,7 +139,7 @@ class Level:
         The end of one crease, a dart, is among them; a vertex on a boundary is not.
         """
         mesh = self.topology
-        ringed = mesh.count_fans(self.blocks.quiet()) == 1
+        ringed = mesh.fan_count == 1
         if len(mesh.sharp_count):
             creases = mesh.count_ends(mesh.crease_edges)
             ringed &= (mesh.sharp_count == 0) | ((mesh.sharp_count == 1) & (creases == 1))

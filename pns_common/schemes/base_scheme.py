@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.kernels import loop as kernels
-from pns_common.mesh.sectors import LimitNormals
 from pns_common.mesh.topology import Topology, split_faces
 from pns_common.parallel import Blocks
+from pns_common.schemes.sector_masks import LimitNormals
 
 WIDTH = 3
 # Weights of a vertex on a sharp curve and of either neighbour along it, at each level and for ever.

@@ -38,20 +38,22 @@ from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
 from pns_common.mesh.rows import ranges
-from pns_common.mesh.sectors import (
-    CLOSED,
-    CURVE,
-    DART,
-    LimitNormals,
-    find_sectors,
-    mask_tables,
-    sector_normals,
-)
+from pns_common.mesh.sectors import find_sectors
 from pns_common.mesh.topology import NO_WEIGHTS, Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
 from pns_common.schemes.catmull_clark_masks import place
+from pns_common.schemes.sector_masks import (
+    CLOSED,
+    CURVE,
+    DART,
+    LimitNormals,
+    mask_tables,
+    sector_normals,
+)
 
+# A neighbour's weight, in units of an opposite corner's.
+EDGE = 4
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 4.0, (7 - 45**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -71,16 +73,20 @@ def limit_positions(
     mesh, count = topology, topology.vertex_count
     none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
     smooth = replace(mesh, **none)
-    placed = place(points, smooth, blocks)
-    sums, read = np.empty((count, WIDTH + 1)), (placed, mesh.connectivity, mesh.corner_reach)
-    blocks.owners(count).run(count, kernels.sum_limit_corners, *read, sums)
-    limits = sums[:, :WIDTH].copy()
+    placed, edge_count = place(points, smooth, blocks), len(mesh.edges)
+    vertices, edges, faces = np.split(placed, [count, count + edge_count])
+    sums, counts = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
+    around = edges, faces, mesh.connectivity, mesh.corner_reach, True, EDGE / 2
+    blocks.owners(count).run(count, kernels.sum_corners, *around, sums, counts)
+    k = counts[:, None].astype(np.float64)
+    limits = (k * k * vertices + sums) / np.maximum(k * (k + 5), 1)
+    few = counts < kernels.LEAST_CORNERS
+    limits[few] = vertices[few]
     # Without an edge of sharpness 1 nothing is counted.
     darts = np.flatnonzero(mesh.sharp_count == DART)
-    darts = darts[sums[darts, WIDTH] >= kernels.LEAST_CORNERS]
+    darts = darts[~few[darts]]
     if len(darts):
-        weight = sums[:, WIDTH] ** 2
-        limits[darts] = _dart_limits(placed, weight, mesh)[darts]
+        limits[darts] = _dart_limits(placed, k[:, 0] ** 2, mesh)[darts]
     follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
@@ -89,7 +95,7 @@ def _dart_limits(
     placed: Float[np.ndarray, "W 3"], weight: Float[np.ndarray, " V"], topology: Topology
 ) -> Float[np.ndarray, "V 3"]:
     """Return limits, right at vertices on exactly one sharp edge; ``weight`` is k²."""
-    around, count = find_sectors(topology, quads=True), topology.vertex_count
+    around, count = find_sectors(topology.connectivity, quads=True), topology.vertex_count
     total, sums = weight.copy(), weight[:, None] * placed[:count]
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
     size = around.size[rows]
@@ -138,8 +144,8 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    around = find_sectors(topology, quads=True)
-    return sector_normals(place(points, topology, blocks), topology, around, tangent_mask, blocks)
+    placed = place(points, topology, blocks)
+    return sector_normals(placed, topology, tangent_mask, blocks, quads=True)
 
 
 def tangent_mask(kind: int, k: int) -> Float[np.ndarray, "N 2"]:

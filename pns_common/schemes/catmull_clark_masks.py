@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
+from pns_common.kernels.loop import MIDPOINT
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import CURVE, WIDTH, follow_curves, in_threes
@@ -42,7 +43,7 @@ def _place_three(
     read, counts = mesh.connectivity, np.empty(count, np.int32)
     blocks.run(mesh.face_count, kernels.place_faces, points, read, at_faces)
     blocks.run(edge_count, kernels.place_edges, points, at_faces, read, mesh.soft, at_edges)
-    around = points, at_faces, read, mesh.corner_reach
+    around = points, at_faces, read, mesh.corner_reach, False, MIDPOINT
     blocks.owners(count).run(count, kernels.sum_corners, *around, vertices, counts)
     blocks.run(count, kernels.blend_corners, points, counts, vertices)
     follow_curves(points, topology, CURVE, vertices)

@@ -38,19 +38,19 @@ from jaxtyping import Float, Integer
 
 from pns_common.kernels import loop as masks
 from pns_common.mesh.rows import ranges
-from pns_common.mesh.sectors import (
-    CLOSED,
-    CURVE,
-    DART,
-    LimitNormals,
-    find_sectors,
-    mask_tables,
-    sector_normals,
-)
+from pns_common.mesh.sectors import find_sectors
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
 from pns_common.schemes.loop_weights import beta, limit_ring_weight
+from pns_common.schemes.sector_masks import (
+    CLOSED,
+    CURVE,
+    DART,
+    LimitNormals,
+    mask_tables,
+    sector_normals,
+)
 
 # Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
@@ -62,7 +62,7 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    return sector_normals(points, topology, find_sectors(topology), tangent_mask, blocks)
+    return sector_normals(points, topology, tangent_mask, blocks)
 
 
 # --- positions ------------------------------------------------------------------------------------
@@ -93,7 +93,7 @@ def _dart_limits(
     beta_of_darts: Float[np.ndarray, "D 1"],
 ) -> Float[np.ndarray, "D 3"]:
     """Return the limits of the vertices on exactly one sharp edge."""
-    around, sums = find_sectors(topology), np.zeros((topology.vertex_count, WIDTH))
+    around, sums = find_sectors(topology.connectivity), np.zeros((topology.vertex_count, WIDTH))
     total = np.zeros(topology.vertex_count)
     assert topology.sharpest is not None
     # The sharp edge: 2 (β + an eighth of both spokes beside it); that eighth is in the tables.

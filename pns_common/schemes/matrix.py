@@ -64,7 +64,6 @@ class SubdivisionMatrix:
 def subdivision_matrix(
     topologies: Sequence[Topology],
     base: BaseScheme,
-    blocks: Blocks | None = None,
     at_last: Place | None = None,
 ) -> SubdivisionMatrix:
     """Return S with S @ values = ``columns.refine_columns(values, topologies, base)``, to rounding.
@@ -73,7 +72,7 @@ def subdivision_matrix(
     two of, of which a mesh needs a few more than its largest valence. `at_last` are masks to apply
     to the refined mesh: ``limit_positions``.
     """
-    blocks = blocks or Blocks()
+    blocks = Blocks()
     made = mask_matrix(topologies[0], base.place, blocks)
     for topology in topologies[1:]:
         made = product(mask_matrix(topology, base.place, blocks), made)

@@ -202,12 +202,13 @@ def _refined(
             packing += BYTES_FOR_NORMALS
         if options.limit:
             packing += BYTES_FOR_LIMIT
-        upload = read_upload(data, media, options.levels, limits, siblings, packing)
+        upload = read_upload(data, media, options.faces_after, limits, siblings, packing)
         scheme = _for_polygons(upload, scheme, options)
         if scheme.base.polygons:
             # A triangle alone becomes six, where Loop's scheme makes four.
             more = packing + (BYTES_PER_FACE_OF_MESH + packing) // 2
-            check_cost(upload.document, upload.plans, len(data), options.levels, limits, more)
+            after = options.faces_after
+            check_cost(upload.document, upload.plans, len(data), after, limits, more)
         instances = mesh_instances(upload.document)
         changes = _changes_of_container(upload, options)
         changes += upload.changes + storage_changes(upload.document, upload.plans)

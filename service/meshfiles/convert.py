@@ -282,14 +282,7 @@ def converted(
             written = replace(written, triangles=_triangles_of(refined))
         else:
             near = nearby(refined.libraries, Opened(siblings))
-            kept, changes = held(replace(refined, libraries=near), target)
-            written = Written(
-                FORMATS[target].write(kept),
-                with_changes(report, changes),
-                len(kept.sizes),
-                _triangles_of(kept),
-                parents=_map_of(kept, target),
-            )
+            written = _of_mesh(replace(refined, libraries=near), report, [], target)
     return replace(written, seconds=stages.seconds, faces_in=len(mesh.sizes))
 
 
@@ -297,10 +290,17 @@ def _triangles_of(mesh: MeshFile) -> int:
     return len(mesh.corners) - 2 * len(mesh.sizes)
 
 
-def _map_of(mesh: MeshFile, target: str) -> Arrays:
-    if mesh.parents is None:
-        return {}
-    return matrix_arrays(mesh.parents.take(FORMATS[target].order(mesh)))
+def _of_mesh(
+    mesh: MeshFile, report: dict[str, Any], changes: Sequence[Change], target: str
+) -> Written:
+    """Write what a format can hold of a refined mesh; report what it cannot."""
+    kept, lost = held(mesh, target)
+    report = with_changes(report, [*changes, *lost])
+    parents: Arrays = {}
+    if kept.parents is not None:
+        parents = matrix_arrays(kept.parents.take(FORMATS[target].order(kept)))
+    content, faces = FORMATS[target].write(kept), len(kept.sizes)
+    return Written(content, report, faces, _triangles_of(kept), parents=parents)
 
 
 def _taken(
@@ -317,24 +317,35 @@ def _taken(
 
 
 def predicted_faces(
-    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles
-) -> int:
-    """Return how many faces the refined file will have, found without refining.
+    data: bytes,
+    kind: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    siblings: SiblingFiles,
+) -> tuple[int, int]:
+    """Return how many faces a file has, and how many the refined one will have.
+
+    With a goal they are refined and counted, and nothing is written; else they are known before.
 
     Raises:
-        ServiceError: the file cannot be used, or would be over a limit; or a goal is given.
+        ServiceError, PnsError: the file cannot be used, or would be over a limit.
     """
-    if options.goals:
-        raise InvalidParameter(
-            "dry_run",
-            f"how many faces {', '.join(options.goals)} gives is known when they are made",
-        )
     if kind in GLTF_KINDS:
-        upload = read_upload(data, kind, options.levels, limits, siblings)
-        return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
+        if options.goals:
+            asked = options, model, limits, Stages(), siblings
+            scene = refine_scene(data, kind, *asked, check=lambda upload: None)
+            return scene.faces_in, scene.report["totals"]["faces"]
+        upload = read_upload(data, kind, options.faces_after, limits, siblings)
+        faces = sum(mesh.faces for mesh in upload.plans)
+        return faces, options.faces_after(faces)
     mesh = read_within(data, kind, limits)
+    if options.goals:
+        taken, scheme = _taken(mesh, options, model, limits)
+        _, report = refine_mesh_file(taken, scheme, options, limits)
+        return len(mesh.sizes), report["totals"]["faces"]
     check_cost(mesh, options, limits)
-    return faces_after(mesh, options.levels)
+    return len(mesh.sizes), faces_after(mesh, options)
 
 
 def _kind(name: str, path: Path) -> str:
@@ -388,9 +399,7 @@ def _flattened(
     siblings: SiblingFiles,
 ) -> Written:
     """Refine a glTF and write its scene as one mesh."""
-    changes: list[Change] = []
-    if options.compress != "none":
-        changes.append(NOT_COMPRESSED)
+    changes = [NOT_COMPRESSED] if options.compress != "none" else []
     # How many faces a goal makes of one is not known yet.
     each = 1 if options.goals else 4**options.levels
 
@@ -404,12 +413,9 @@ def _flattened(
             for mesh, refined in scene.meshes.items()
         }
         mesh, lost = flatten(scene.upload, surfaces, target, limits)
-        kept, also_lost = held(mesh, target)
-        content = FORMATS[target].write(kept)
-    # A mesh that several nodes show is there several times.
-    report = with_changes(scene.report, [*changes, *lost, *also_lost])
-    faces = len(kept.sizes)
-    return Written(content, report, faces, faces, stages.seconds, scene.faces_in)
+        # A mesh that several nodes show is there several times.
+        written = _of_mesh(mesh, scene.report, [*changes, *lost], target)
+    return replace(written, seconds=stages.seconds, faces_in=scene.faces_in)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
-from pns_common.mesh.rows import disjoint_faces, unit
+from pns_common.mesh.rows import disjoint_faces, marked, unit
 
 from ..changes import Change, counted
 from ..errors import GltfError, UnrefinableError, check_limit
@@ -22,7 +22,7 @@ from ..gltf.read.schema import Document
 from ..gltf.read.upload import Upload
 from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.skin import read_skin_and_morph
-from ..meshes.weld import weld, weld_by_label
+from ..meshes.weld import weld
 from ..options import Limits
 from .formats import FORMATS, Format
 from .mesh_file import (
@@ -315,18 +315,23 @@ def _place(
     follows = read_skin_and_morph(primitives)
     for weight, delta in zip(weights, follows.deltas, strict=False):
         positions += weight * delta.astype(np.float64)
-    faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     known = [surface.vertex for surface in surfaces if surface.vertex is not None]
+    ends = np.cumsum([len(p.attributes["POSITION"]) for p in primitives])
+    corners = [p.corners for p in primitives]
     if len(known) == len(surfaces):
-        welded = weld_by_label(positions, faces, np.concatenate(known))
+        vertex_of = np.concatenate(known)
+        used = np.flatnonzero(marked(vertex_of, int(vertex_of.max()) + 1))
+        vertex_of = vertex_of if used[-1] + 1 == len(used) else np.searchsorted(used, vertex_of)
     else:
-        welded = weld(positions, faces, follows.labels)
-    used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
-    rows = np.empty(len(welded.points), dtype=np.int64)
-    rows[welded.vertex_of[used]] = used
-    world = welded.points @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = disjoint_faces(zip(corners, np.diff(ends, prepend=0), strict=True))
+        vertex_of = weld(positions, faces, follows.labels).vertex_of
+    used = np.flatnonzero(vertex_of >= 0)
+    rows = np.empty(int(vertex_of.max()) + 1, dtype=np.int64)
+    rows[vertex_of[used]] = used
+    points = positions[rows]
+    world = _times(points, matrix[:3, :3]) + matrix[:3, 3]
     if joints is not None and follows.binding is not None:
-        world = posed(welded.points, follows.binding.take(rows), joints, placed=world)
+        world = posed(points, follows.binding.take(rows), joints, placed=world)
         matrix = joints[0]
     # A mirroring node turns faces over; their order of corners keeps them facing outwards.
     mirrored = np.linalg.det(matrix[:3, :3]) < 0
@@ -349,15 +354,24 @@ def _place(
     }
     for name in dict.fromkeys(n for p in primitives for n in p.attributes if n.startswith("_")):
         columns[name] = [p.attributes.get(name) for p in primitives]
-    corners = [p.corners[:, turn].reshape(-1) for p in primitives]
+    corners = [own[:, turn].reshape(-1) for own in corners]
     layers = {
         name: joined_layer(list(zip(values, corners, strict=True)))
         for name, values in columns.items()
         if any(column is not None for column in values)
     }
     of_face = np.repeat(materials, [len(p.corners) for p in primitives])
-    placed = of_triangles(world, welded.faces[:, turn])
+    vertices = np.split(vertex_of, ends[:-1])
+    vertices = [own[places] for own, places in zip(vertices, corners, strict=True)]
+    placed = of_triangles(world, np.concatenate(vertices).reshape(-1, 3))
     return replace(placed, layers=layers, labels={MATERIAL: Labels((), of_face)})
+
+
+def _times(
+    rows: Float[np.ndarray, "N 3"], matrix: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "N 3"]:
+    """Return the product of a matrix with each row, by no BLAS, whose bits differ by machine."""
+    return np.einsum("ni,ji->nj", rows, matrix)
 
 
 def _turned(
@@ -367,7 +381,7 @@ def _turned(
     linear = matrix[:3, :3]
     cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]])
     sign = np.sign(np.linalg.det(linear)) or 1.0
-    return unit(sign * normals.astype(np.float64) @ cofactors.T)
+    return unit(_times(normals.astype(np.float64), sign * cofactors))
 
 
 def _uv(primitive: TrianglePrimitive, material: dict[str, Any]) -> Float[np.ndarray, "N 2"] | None:
@@ -409,8 +423,10 @@ def _joined(
         labels[MATERIAL] = Labels(tuple(materials), of_face)
         if form.unit and COLOUR not in layers:
             layers[COLOUR] = Layer(_shown_colours(tree), np.repeat(of_face, 3))
-    faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
-    made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
+    made = placed[0]
+    if len(placed) > 1:
+        faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
+        made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
     labels = {kind: label for kind, label in labels.items() if kind in form.labels}
     made = replace(made, layers=layers, labels=labels)
     if form.unit:
@@ -443,10 +459,14 @@ def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
     ]
     named = "definitions of materials" if MATERIAL in FORMATS[kind].labels else "materials"
     changes += lost_at("/materials", {named: len(tree.get("materials", []))})
+    of_mesh = [mesh.get("primitives", []) for mesh in tree.get("meshes", [])]
+    primitives = [primitive for own in of_mesh for primitive in own]
+    modes = [primitive.get("mode", TRIANGLES) for primitive in primitives]
+    targets = ([len(primitive.get("targets", [])) for primitive in own] for own in of_mesh)
     of_meshes = {
-        "morph targets": _count_targets(tree),
-        "points and lines": _count_other_modes(tree),
-        "outlines": _count_outlines(tree),
+        "morph targets": sum(max(own, default=0) for own in targets),
+        "points and lines": sum(mode not in SURFACES for mode in modes),
+        "outlines": sum(OUTLINE in p.get("extensions", {}) for p in primitives),
     }
     changes += lost_at("/meshes", of_meshes)
     children = _children(tree.get("nodes", []))
@@ -463,27 +483,3 @@ def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
     }
     counts = {f"attribute {name}": sum(name in own for own in names) for name in sorted(lost)}
     return changes + lost_at("/meshes", counts)
-
-
-def _count_targets(tree: dict[str, Any]) -> int:
-    return sum(
-        max(
-            (len(primitive.get("targets", [])) for primitive in mesh.get("primitives", [])),
-            default=0,
-        )
-        for mesh in tree.get("meshes", [])
-    )
-
-
-def _count_outlines(tree: dict[str, Any]) -> int:
-    primitives = (p for mesh in tree.get("meshes", []) for p in mesh.get("primitives", []))
-    return sum(OUTLINE in primitive.get("extensions", {}) for primitive in primitives)
-
-
-def _count_other_modes(tree: dict[str, Any]) -> int:
-    """Return how many primitives are no surfaces."""
-    return sum(
-        primitive.get("mode", TRIANGLES) not in SURFACES
-        for mesh in tree.get("meshes", [])
-        for primitive in mesh.get("primitives", [])
-    )

@@ -262,7 +262,8 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    faces = mesh.corners[fans(mesh.offsets)[0]]
+    triangles = (mesh.sizes == 3).all()
+    faces = mesh.faces if triangles else mesh.corners[fans(mesh.offsets)[0]]
     rounded, flat = mesh.vertices.astype(np.float32), 0
     if not np.array_equal(rounded, mesh.vertices):
         flat = int((_without_area(rounded, faces) & ~_without_area(mesh.vertices, faces)).sum())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -82,7 +83,7 @@ class MeshFile:
     parents: SubdivisionMatrix | None = None
     unit: str = ""
 
-    @property
+    @cached_property
     def sizes(self) -> Int[np.ndarray, " F"]:
         """Number of corners of each polygon."""
         return np.diff(self.offsets)
@@ -125,7 +126,7 @@ def of_triangles(
     normals: Float[np.ndarray, "V 3"] | None = None,
 ) -> MeshFile:
     """Make a mesh of triangles; `uv` and `normals` are those of the vertices."""
-    corners = faces.reshape(-1).astype(np.int64)
+    corners = faces.reshape(-1).astype(np.int64, copy=False)
     given = {NORMAL: normals, UV: uv}
     layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)

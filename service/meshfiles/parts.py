@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.mesh.rows import distinct_rows, marked, number_by_first_appearance, unit
+from pns_common.mesh.rows import (
+    distinct_rows,
+    first_places,
+    marked,
+    number_by_first_appearance,
+    unit,
+)
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ..changes import Change
@@ -118,7 +124,7 @@ def _primitive(
         else:
             layers[name] = Layer(layer.values, rows)
     vertex = mesh.corners[corners]
-    row, first = distinct_corners(vertex, layers)
+    row, first = number_by_first_appearance(corner_labels(vertex, layers))
     attributes = {"POSITION": mesh.vertices[vertex[first]]}
     for name, layer in layers.items():
         values = layer.values[layer.rows[first]]
@@ -131,17 +137,15 @@ def _primitive(
     return TrianglePrimitive(number, vertex[first], row.reshape(-1, 3), attributes, accessors)
 
 
-def distinct_corners(
-    vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]
-) -> tuple[Int[np.ndarray, " C"], Int[np.ndarray, " R"]]:
-    """Give corners numbers by vertex and rows of layers; return also where each comes first."""
+def corner_labels(vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]) -> Int[np.ndarray, " C"]:
+    """Return labels that corners share which have one vertex and one row of each layer."""
     columns = [vertex]
     for layer in layers.values():
         if not any(np.array_equal(layer.rows, column) for column in columns):
             columns.append(layer.rows)
     if all(_follows(column, columns[-1]) for column in columns[:-1]):
-        return number_by_first_appearance(columns[-1])
-    return number_by_first_appearance(distinct_rows(np.stack(columns, axis=1)))
+        return columns[-1]
+    return number_by_first_appearance(distinct_rows(np.stack(columns, axis=1)))[0]
 
 
 def _follows(column: Int[np.ndarray, " C"], other: Int[np.ndarray, " C"]) -> bool:
@@ -158,7 +162,10 @@ def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:
     layers = {name: layer for name, layer in mesh.layers.items() if name in names}
     if all(np.array_equal(layer.rows, mesh.corners) for layer in layers.values()):
         return mesh
-    row, first = distinct_corners(mesh.corners, layers)
+    row = corner_labels(mesh.corners, layers)
+    first = first_places(row, int(row.max(initial=-1)) + 1)
+    if (first < 0).any():
+        row, first = number_by_first_appearance(row)
     kept = {name: Layer(layer.values[layer.rows[first]], row) for name, layer in layers.items()}
     return replace(
         mesh,

@@ -6,7 +6,7 @@ import pytest
 from pns_common import Creases, Mesh, ParameterError, catmull_clark, loop
 from pns_common import refine as refine_to_limit
 from pns_common.carry import rules
-from pns_common.carry.carried import Carried, Column, refine_carried
+from pns_common.carry.carried import Carried, Carrier, Column, refine_carried
 from pns_common.carry.charts import refine_corners
 from pns_common.schemes import CATMULL_CLARK, LOOP
 from tests.support.control_points import refine
@@ -39,6 +39,23 @@ def test_positions_carried_smoothly_are_the_positions(name, levels, limit):
         made, fine = carried(*asked, limit=limit, creases=creases)
         expected = fine.vertices if at == "vertices" else fine.vertices[fine.corners]
         np.testing.assert_array_equal(made, expected)
+
+
+@pytest.mark.parametrize("rule", [rules.smooth, rules.linear, rules.nearest])
+@pytest.mark.parametrize("name", SCHEMES)
+def test_corners_without_seams_have_one_value_at_each_vertex(name, rule):
+    """A file of such values keeps one a vertex, labels too."""
+    shape, scheme = SCHEMES[name]
+    mesh = Mesh(*shape)
+    made = refine(mesh, scheme, 2)
+    carrier = Carrier(made.topologies, scheme.base)
+    values, points = carrier.at_points(
+        Column(np.arange(len(mesh.vertices))[mesh.corners, None], rule)
+    )
+    at_vertices = carrier.at_vertices(Column(np.arange(len(mesh.vertices))[:, None], rule))
+    assert len(values) == len(made.mesh.vertices)
+    if rule in (rules.smooth, rules.linear):
+        np.testing.assert_array_equal(values[points], at_vertices[made.mesh.corners])
 
 
 @pytest.mark.parametrize("name", SCHEMES)

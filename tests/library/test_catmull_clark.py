@@ -7,11 +7,9 @@ from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, MeshError, catmull_clark, loop
 from pns_common.carry.columns import level_topologies
-from pns_common.mesh.quads import split_quads
-from pns_common.mesh.topology import build_topology
+from pns_common.mesh.topology import build_topology, split_quads
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK
-from pns_common.schemes.matrix import subdivision_matrix
 from tests.support import opensubdiv
 from tests.support.control_points import refine
 from tests.support.meshes import bent, manifolds
@@ -21,7 +19,6 @@ from tests.support.polygons import (
     polygon_manifolds,
     polygon_soups,
     quad_grid,
-    quad_star,
     uneven,
 )
 
@@ -150,30 +147,6 @@ def test_masks_equal_a_slow_and_obvious_oracle(mesh, seed, soft):
         several = np.flatnonzero(topology.sharpest.weights[:, 2] == 1) if topology.sharpest else []
         np.testing.assert_array_equal(placed[several], points[several])
     np.testing.assert_allclose(placed, expected, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("valence", range(3, 13))
-def test_tangent_eigenvalue_of_the_star_is_the_published_one(valence):
-    """The subdivision matrix of a k-star has λ of Halstead, Kass and DeRose twice."""
-    points, faces = quad_star(valence, rings=2)
-    topologies = level_topologies(faces, len(points), 1, base=CATMULL_CLARK)
-    matrix, topology = subdivision_matrix(topologies, CATMULL_CLARK), topologies[0]
-    dense = np.zeros(matrix.shape)
-    dense[matrix.rows, matrix.columns] = matrix.weights
-    count, edge_count = len(points), len(topology.edges)
-    at = np.flatnonzero((topology.edges == 0).any(axis=1))
-    near = np.flatnonzero((faces == 0).any(axis=1))
-    opposite = [face[(list(face).index(0) + 2) % 4] for face in faces[near]]
-    ring = [0, *topology.edges[at].max(axis=1), *opposite]
-    rows = [0, *(count + at), *(count + edge_count + near)]
-    star = dense[np.ix_(rows, ring)]
-    np.testing.assert_allclose(star.sum(axis=1), 1, atol=1e-14)
-    values = np.sort(np.abs(np.linalg.eigvals(star)))[::-1]
-    c = np.cos(2 * np.pi / valence)
-    published = (5 + c + np.cos(np.pi / valence) * np.sqrt(18 + 2 * c)) / 16
-    np.testing.assert_allclose(values[1:3], published, atol=1e-12)
-    assert values[0] == pytest.approx(1)
-    assert values[3] < published - 1e-3
 
 
 # --- connectivity ---------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
+from tests.support.polygons import renumbered
 
 seeds = st.integers(0, 2**31)
 
@@ -84,11 +85,7 @@ def test_an_angle_of_ones_own_finds_all_edges_beyond_it():
 
 @given(manifolds(), seeds)
 def test_sharp_edges_do_not_depend_on_numbering(mesh, seed):
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(len(mesh.vertices))
-    other = Mesh(
-        mesh.vertices[np.argsort(order)], order[mesh.faces][rng.permutation(len(mesh.faces))]
-    )
+    other, order = renumbered(mesh, seed)
     pairs = {frozenset(order[pair].tolist()) for pair in sharp_edges(mesh)}
     assert {frozenset(pair.tolist()) for pair in sharp_edges(other)} == pairs
 

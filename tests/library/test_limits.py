@@ -320,6 +320,6 @@ def test_limits_of_any_faces_are_finite_and_each_normal_is_one_or_none(base, dat
 
 @given(st.one_of(manifolds(), soups()))
 def test_every_corner_is_in_one_sector_of_its_own_vertex(mesh):
-    around = find_sectors(mesh.topology())
+    around = find_sectors(mesh.topology().connectivity)
     np.testing.assert_array_equal(around.vertex[around.of_corner], mesh.faces.reshape(-1))
     np.testing.assert_array_equal(np.bincount(around.of_corner), around.size)

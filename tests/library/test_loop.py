@@ -55,32 +55,6 @@ def test_real_closed_meshes_equal_trimesh(name):
     assert match(refined.vertices, expected) < 1e-12
 
 
-@pytest.mark.parametrize("valence", range(3, 13))
-def test_tangent_eigenvalue_of_the_star_is_loops(valence):
-    """The subdivision matrix of a k-star, column by column, has 3/8 + cos(2π/k)/4 twice."""
-    ring = np.arange(valence)
-    faces = np.stack([np.zeros(valence, int), 1 + ring, 1 + (ring + 1) % valence], axis=1)
-    # A second ring makes the first one interior, so that all its footprints are complete.
-    outer = 1 + valence + ring
-    following = (ring + 1) % valence
-    strip = [np.stack([1 + ring, outer, outer[following]], axis=1)]
-    strip += [np.stack([1 + ring, outer[following], 1 + following], axis=1)]
-    faces = np.concatenate([faces, *strip])
-    count = 1 + 2 * valence
-    topology = build_topology(faces, count)
-    star = np.zeros((1 + valence, 1 + valence))
-    edges = {tuple(edge): count + e for e, edge in enumerate(topology.edges.tolist())}
-    rows = [0] + [edges[0, 1 + i] for i in ring]
-    for column in range(1 + valence):
-        points = np.zeros((count, 3))
-        points[column] = 1
-        star[:, column] = refine(Mesh(points, faces), loop(), 1).mesh.vertices[rows, 0]
-    moduli = np.sort(np.abs(np.linalg.eigvals(star)))
-    tangent = 3 / 8 + np.cos(2 * np.pi / valence) / 4
-    assert moduli[-1] == pytest.approx(1, abs=1e-12)
-    np.testing.assert_allclose(moduli[-3:-1], tangent, rtol=0, atol=1e-12)
-
-
 def test_boundary_follows_the_cubic_curve():
     vertices, faces = grid(5, bent)
     refined = refine(Mesh(vertices, faces), loop(), 1).mesh.vertices

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -49,14 +49,15 @@ class Upload:
 def read_upload(
     data: bytes,
     media: Media,
-    levels: int,
+    faces_after: Callable[[int], int],
     limits: Limits,
     siblings: SiblingFiles = ALONE,
     bytes_per_face: int = 0,
 ) -> Upload:
     """Read and check a file, each part after those that it depends on.
 
-    Writing takes `bytes_per_face` for each refined face, in addition to refining.
+    `faces_after` returns how many faces triangles become. Writing takes `bytes_per_face` for each
+    of them, in addition to refining.
 
     Raises:
         ServiceError: the file is unreadable, invalid, over a limit, or cannot be refined.
@@ -95,7 +96,7 @@ def read_upload(
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
     size += repeated + decoded_size(container.text) // BYTES_PER_INPUT_BYTE
-    check_cost(document, plans, size, levels, limits, bytes_per_face)
+    check_cost(document, plans, size, faces_after, limits, bytes_per_face)
     leavable = spare(original, draco_views, ranges, unknown)
     return Upload(container, tree, document, buffers, plans, changes, leavable)
 

@@ -1,4 +1,4 @@
-"""Refine a control mesh to faces of several levels: `tolerance`, `max_faces`, `max_edge_length`."""
+"""Refine a control mesh to faces of several levels: `tolerance`, `max_faces` and other goals."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def refine_to_goal(
     """
 
     def watch(done: int, total: int) -> None:
-        _check_faces(total if done else total // 2, limits)
+        _check_faces(done, limits)
         stages.reach(done / total)
 
     try:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.carry.columns import ColumnRefinement
 from pns_common.errors import MeshError
-from pns_common.mesh.creases import NO_CREASES, Creases, edge_cosines
+from pns_common.mesh.creases import NO_CREASES, Creases
 from pns_common.mesh.mesh import Mesh
 from pns_common.mesh.rows import disjoint_faces, extent
 from pns_common.mesh.topology import Topology
@@ -24,6 +25,7 @@ from pns_common.schemes import LOOP
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...errors import UnrefinableError
+from ...meshes.creases import chosen_creases
 from ...options import Options
 from ...stages import Stages
 from .columns import refined_skin_and_morph
@@ -75,16 +77,19 @@ def creases_of(
     """
     if control.is_empty:
         return NO_CREASES
-    if options.crease == "normals":
-        return Creases(_on_surface(control, hard_edges(control)), border=options.border)
-    if parts is None or options.crease != "auto" or not scheme.creases.learned:
-        by_shape = creases_by_shape(control.surface, options, scheme)
-    else:
-        by_shape = _creases_of_parts(control, parts, scheme)
-    by_shape = replace(by_shape, border=options.border)
+    of_parts = None
+    if parts is not None and scheme.creases.learned:
+        of_parts = partial(_creases_of_parts, control, parts, scheme)
+    creases = chosen_creases(
+        control.surface,
+        options,
+        scheme,
+        lambda: _on_surface(control, hard_edges(control)),
+        of_parts,
+    )
     if options.crease != "auto" or not scheme.creases.finds:
-        return by_shape
-    return by_shape.with_named(_on_surface(control, marked_edges(control)))
+        return creases
+    return creases.with_named(_on_surface(control, marked_edges(control)))
 
 
 def _on_surface(control: ControlMesh, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"]:
@@ -255,17 +260,3 @@ def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, 
             finer.append(values[topology.corners.reshape(-1, 4)].mean(axis=1))
         values = np.concatenate(finer)
     return {RATIO: values[:, 0], GATE: values[:, 1]}
-
-
-def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges of a mesh that the options keep sharp by its shape, by name.
-
-    With `crease=auto` these are the scheme's: none for Loop and models of format 1.
-    """
-    if options.crease == "auto" and scheme.creases.finds:
-        return creases_by_name(mesh, scheme.creases, scheme)
-    if options.crease_angle is None:
-        return NO_CREASES
-    topology = mesh.topology()
-    rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
-    return Creases(topology.edges[rows].astype(np.int64))

@@ -51,6 +51,8 @@ GROUP_FACES = 2**17
 # Costs of stages for each refined face, where refining by Loop with its report costs 1. Measured
 # on a part of 2,000 faces with normals and texture coordinates at four and five levels.
 READ, WELD, LIMIT, ATTRIBUTES = 0.05, 0.05, 2.0, 1.7
+# The same with a goal, by Loop; what is learned adds to the first.
+GOAL, GOAL_ATTRIBUTES = 12.0, 8.0
 WRITE = {"none": 0.1, "meshopt": 2.5, "draco": 25.0}
 
 
@@ -103,10 +105,16 @@ def mostly_polygons(upload: Upload) -> bool:
 
 def stage_shares(scheme: Scheme, options: Options) -> StageShares:
     """Return where the stages of a mesh begin, by their measured costs."""
+    if options.goals:
+        return _shares(GOAL, GOAL_ATTRIBUTES, options)
     made = [4**level for level in range(1, options.levels + 1)]
     learned = made if scheme.learned_levels is None else made[: scheme.learned_levels]
     refine = 1 + LEARNED_COST * sum(learned) / sum(made) + LIMIT * options.limit
-    costs = [READ, WELD, refine, ATTRIBUTES, WRITE[options.compress]]
+    return _shares(refine, ATTRIBUTES, options)
+
+
+def _shares(refine: float, attributes: float, options: Options) -> StageShares:
+    costs = [READ, WELD, refine, attributes, WRITE[options.compress]]
     return StageShares(*(end / sum(costs) for end in list(accumulate(costs))[:-1]))
 
 

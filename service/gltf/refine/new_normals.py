@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh.creases import edge_cosines
 from pns_common.mesh.normals import smooth_fans
-from pns_common.mesh.rows import marked
 from pns_common.mesh.topology import build_topology
 
+from ...meshes.creases import hard_edges as hard_between
 from ...options import Options
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
@@ -30,26 +30,12 @@ MOST = 0.5
 
 
 def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges whose two faces carry different normals at both ends.
+    """Return the edges that normals make hard, as pairs of vertices of the mesh to refine.
 
-    Pairs of vertices of the mesh to refine, the lower first. Both ends count: the sides of a cone
-    share normals along its base and differ at its tip alone, and the cone is smooth. A corner
-    without a normal, or with one of length 0, makes no edge hard.
+    A corner without a normal, or with one of length 0, makes no edge hard.
     """
-    faces = control.mesh.faces
-    label, vertex = control.of_cleaned(_labels_of_faces(control)).reshape(-1), faces.reshape(-1)
-    of_vertex = np.empty(len(control.mesh.vertices), dtype=label.dtype)
-    of_vertex[vertex] = label
-    several = marked(vertex[of_vertex[vertex] != label], len(of_vertex))
-    topology = build_topology(faces, len(of_vertex))
-    edges, half_edges = topology.edges[topology.interior], topology.half_edges[topology.interior]
-    asked = np.flatnonzero(several[edges].all(axis=1))
-    hard = np.ones(len(asked), dtype=bool)
-    there, back = half_edges[asked].T
-    for corners, facing in ((there, _next_corner(back)), (_next_corner(there), back)):
-        first, second = label[corners], label[facing]
-        hard &= (first != NO_NORMAL) & (second != NO_NORMAL) & (first != second)
-    return edges[asked[hard]].astype(np.int64)
+    label = control.of_cleaned(_labels_of_faces(control)).reshape(-1)
+    return hard_between(build_topology(control.mesh.faces, len(control.mesh.vertices)), label)
 
 
 def marked_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
@@ -67,11 +53,6 @@ def marked_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
     beside_smooth = np.zeros(len(mesh.vertices), dtype=bool)
     beside_smooth[topology.edges[bent]] = True
     return hard[beside_smooth[hard].any(axis=1)]
-
-
-def _next_corner(corners: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Return the corner after each corner 3 f + i of its triangle."""
-    return np.where(corners % 3 < 2, corners + 1, corners - 2)
 
 
 def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:

@@ -33,6 +33,7 @@ CHOSEN = {
     "compress": {"compress": "draco"},
     "limit": {"limit": False},
     "tolerance": {"tolerance": "1%"},
+    "angle": {"angle": 10.0},
     "max_faces": {"max_faces": 100},
     "max_edge_length": {"max_edge_length": "5%"},
 }

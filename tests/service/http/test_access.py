@@ -360,7 +360,7 @@ REBOUND = ("evil.example", "evil.example:8000", "", "[", "localhost.evil.example
     [
         *(({}, host, 400) for host in (*REBOUND, "127.0.0.1.evil.example")),
         ({"proxies": "192.0.2.1"}, "pns.example", 400),
-        (NAMED, "evil.example", 400),
+        *((NAMED, host, 400) for host in ("evil.example", "evilpns.example")),
         (NAMED, "PNS.example", 200),
         (NAMED, "a.pns.example:443", 200),
         ({"hosts": "*"}, "evil.example", 200),

@@ -32,7 +32,6 @@ MESH = (
     + "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES)
     + "</triangles></mesh>"
 )
-WRONG = MESH.replace('v1="1"', 'v1="4"')
 
 
 def package(model, relations=RELATIONS, **more):
@@ -232,36 +231,36 @@ def test_a_file_has_the_same_bytes_each_time():
     assert formats.write(again, "3mf") == formats.write(mesh, "3mf")
 
 
-SELF = '<object id="1"><components><component objectid="1"/></components></object>'
-MANY = "".join(
-    f'<object id="{k}"><components>{f"<component objectid={chr(34)}{k + 1}{chr(34)}/>" * 2}'
-    "</components></object>"
-    for k in range(1, 40)
-)
+def of_parts(number, part, count):
+    """An object of so many copies of another one."""
+    parts = f'<component objectid="{part}"/>' * count
+    return f'<object id="{number}"><components>{parts}</components></object>'
+
+
+def printed(mesh, items='<item objectid="1"/>', head=""):
+    return package(model(f'<object id="1">{mesh}</object>', items, head))
+
+
+NO_PART = '<item objectid="1" p:path="/3D/z.model"/>'
+CIPHER = 'requiredextensions="q" xmlns:q="http://cipher"'
 REFUSED = [
     (b"PK\x03\x04", "the archive cannot be read"),
     (package(model(""), relations="<Relationships/>"), "names no 3D model"),
     (package("<model"), "3D/a.model of the 3MF file is no XML"),
     (package(f'<!DOCTYPE x [<!ENTITY a "b">]>{model("")}'), "line 1 of 3D/a.model.*no DTD"),
     (package(model("")), "has no object 1 in 3D/a.model"),
-    (package(model('<object id="1"/>')), "prints no triangles"),
-    (package(model(f'<object id="1">{MESH.replace("z=", "w=", 1)}</object>')), "'z' is missing"),
-    (package(model(f'<object id="1">{MESH.replace("10.0", "ten", 1)}</object>')), "'ten'"),
+    (printed(""), "prints no triangles"),
+    (printed(MESH.replace("z=", "w=", 1)), "'z' is missing"),
+    (printed(MESH.replace("10.0", "ten", 1)), "'ten'"),
     (
-        package(model(f'<object id="1">{WRONG}</object>')),
+        printed(MESH.replace('v1="1"', 'v1="4"')),
         "triangle 3 of object 1 in 3D/a.model names vertices 4, 2, 3, expected 0 … 3",
     ),
-    (
-        package(model(f'<object id="1">{MESH}</object>', '<item objectid="1" transform="1 0"/>')),
-        "a transform has twelve numbers",
-    ),
-    (package(model(SELF)), "object 1 of the 3MF file is a part of itself"),
-    (
-        package(model("", head='requiredextensions="q" xmlns:q="http://cipher"')),
-        "it needs the extension http://cipher",
-    ),
+    (printed(MESH, '<item objectid="1" transform="1 0"/>'), "a transform has twelve numbers"),
+    (package(model(of_parts(1, 1, 1))), "object 1 of the 3MF file is a part of itself"),
+    (package(model("", head=CIPHER)), "it needs the extension http://cipher"),
     (package(model("", head='unit="parsec"')), "unit 'parsec' must be one of micron, milli"),
-    (package(model('<object id="1"/>', '<item objectid="1" p:path="/3D/z.model"/>')), "no part 3D"),
+    (printed("", NO_PART), "no part 3D"),
 ]
 
 
@@ -272,5 +271,6 @@ def test_what_is_no_print_is_refused_with_its_place(data, text):
 
 
 def test_copies_of_copies_are_counted_before_they_are_made():
+    many = "".join(of_parts(number, number + 1, 2) for number in range(1, 40))
     with pytest.raises(LimitError, match="too many"):
-        formats.read(package(model(MANY + f'<object id="40">{MESH}</object>')), "3mf")
+        formats.read(package(model(f'{many}<object id="40">{MESH}</object>')), "3mf")

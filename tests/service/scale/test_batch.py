@@ -170,6 +170,17 @@ def test_a_dry_run_writes_nothing_but_its_report(tmp_path):
     assert planned.faces["planned"] == refined(batch_of(tmp_path)).faces["done"] > 0
 
 
+@pytest.mark.parametrize("goal", [{"tolerance": "3%"}, {"angle": 25.0}, {"max_faces": 2000}])
+def test_a_dry_run_of_a_goal_counts_what_the_run_writes(tmp_path, goal):
+    library(tmp_path / "in")
+    options = replace(LOOP, crease="angle:30", **goal)
+    planned = refined(batch_of(tmp_path, options=options, dry=True))
+    assert planned.counts == {"planned": 3}
+    assert not (tmp_path / "out").exists()
+    done = refined(batch_of(tmp_path, options=options))
+    assert planned.faces["planned"] == done.faces["done"] > 16
+
+
 def test_two_runs_at_once_do_no_harm(tmp_path):
     library(tmp_path / "in", [f"{number}.obj" for number in range(12)])
     batch = batch_of(tmp_path)
