@@ -39,6 +39,8 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
+# Errors whose ratio is this near to 1 are equal: networks compute in single precision.
+EQUAL = 1e-4
 # The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
 # are 2 k + 1 and 2 k + 2.
 HALVES = 0.5 * np.array(
@@ -293,7 +295,7 @@ def _with_so_many(start: Start) -> Tree:
         known = tree.measured
         del tree
         tree = start.grow(threshold, known=known)
-    order, turn = _worst_first(tree), 0
+    (order, errors), turn = _worst_first(tree), 0
     low, fewer = 0, tree.layers[0].part.topology.face_count
     high, more = len(order), made
     if made <= most:
@@ -302,14 +304,22 @@ def _with_so_many(start: Start) -> Tree:
         # Faces are nearly proportional to splits; each third time the middle, so that it ends.
         turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
         middle = min(max(low + int(share * (high - low)), low + 1), high - 1)
-        made = tree.count(tree.closed(_flagged(tree, order[:middle])))
+        made = tree.count(tree.closed(_flagged(tree, order[: _untied(errors, middle)])))
         if made <= most:
             low, fewer = middle, made
         else:
             high, more = middle, made
-    forced, known = tree.codes(tree.closed(_flagged(tree, order[:low]))), tree.measured
+    first = order[: _untied(errors, low)]
+    forced, known = tree.codes(tree.closed(_flagged(tree, first))), tree.measured
     del tree
     return start.grow(threshold, forced, only=True, known=known)
+
+
+def _untied(errors: Float[np.ndarray, " N"], count: int) -> int:
+    """Return how many of the first errors are split: those that are equal together, or not."""
+    if count == len(errors):
+        return count
+    return int(np.argmax(errors <= errors[count] * (1 + EQUAL)))
 
 
 def _largest_left(tree: Tree, deepest: int) -> float:
@@ -321,8 +331,8 @@ def _largest_left(tree: Tree, deepest: int) -> float:
     return float(max(errors))
 
 
-def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
-    """Return depth and row of split faces, those of the largest errors first, by place if equal."""
+def _worst_first(tree: Tree) -> tuple[Integer[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
+    """Return depth and row of split faces, and errors, largest first; equal ones by place."""
     errors, above = [layer.errors.copy() for layer in tree.layers], list[np.ndarray]()
     for finer, coarser, of_finer, of_coarser in zip(
         tree.layers[:0:-1], tree.layers[-2::-1], errors[:0:-1], errors[-2::-1], strict=True
@@ -341,7 +351,7 @@ def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
     size = np.abs(places).max(initial=0.0) or 1.0
     keys = np.round(places / size, DIGITS)
     order = np.lexsort([*keys.T[::-1], np.concatenate(at)[:, 0], -_shortened(error)])
-    return np.concatenate(at)[order]
+    return np.concatenate(at)[order], error[order]
 
 
 def _shortened(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
