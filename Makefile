@@ -77,7 +77,7 @@ quick: kernels
 # skipped. What they bring for pytest is left alone.
 interop-test: $(INTEROP)/.ready
 	$(INTEROP)/bin/python -c 'import meshio, open3d, pyvista, trimesh'
-	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/library/interop tests/library/test_pyvista.py
+	PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 OMP_NUM_THREADS=1 $(INTEROP)/bin/python -m pytest tests/library/interop
 
 # What `make test` shows on one of each kind, on all there are.
 exhaustive: kernels

@@ -9,8 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 BLOCK_ROWS = 32_768
@@ -58,12 +59,18 @@ class Blocks:
             rows = max(1, -(-count // blocks))
         return [slice(start, min(start + rows, count)) for start in range(0, count, rows)]
 
-    def run(self, count: int, work: Callable[[int, int], T]) -> list[T]:
-        """Call ``work(begin, end)`` for each block of ``count`` rows; return results in order."""
+    def run(
+        self,
+        count: int,
+        work: Callable[Concatenate[int, int, P], T],
+        *given: P.args,
+        **named: P.kwargs,
+    ) -> list[T]:
+        """Call ``work(begin, end, *given)`` for each block of rows; return results in order."""
         if 0 < count <= (self.rows or LEAST_ROWS):
             # One block: all else would take as long as its work, in a small mesh.
             self.before(count)
-            return [work(0, count)]
+            return [work(0, count, *given, **named)]
         slices = self.slices(count)
         results: list[Any] = [None] * len(slices)
         waiting = deque(enumerate(slices))
@@ -72,7 +79,7 @@ class Blocks:
             try:
                 for number, rows in _taken(waiting):
                     self.before(rows.stop - rows.start)
-                    results[number] = work(rows.start, rows.stop)
+                    results[number] = work(rows.start, rows.stop, *given, **named)
             except BaseException:
                 waiting.clear()
                 raise

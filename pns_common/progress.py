@@ -11,6 +11,32 @@ LEARNED_COST, LIMIT_COST = 6, 3
 ROWS_PER_FACE, LEARNED_ROWS_PER_FACE = 2.0, 4.0
 
 
+class Shares:
+    """Turns shares of the work into faces made so far, where their number is not yet known.
+
+    Args:
+        tell: as of ``Progress``; the faces made in the end are those that the share lets expect.
+            None: nothing is reported.
+    """
+
+    def __init__(self, tell: Callable[[int, int], None] | None) -> None:
+        self._tell, self._share, self._faces = tell, 0.0, 1
+        self._begin, self._end = 0.0, 1.0
+
+    def part(self, begin: float, end: float) -> None:
+        """Go on from one share of the work to another."""
+        self._begin, self._end = begin, end
+
+    def reach(self, share: float, faces: int) -> None:
+        """Report a share of the part, and how many faces there are so far."""
+        self._share = max(self._share, self._begin + (self._end - self._begin) * share)
+        self._faces = max(self._faces, faces)
+        if self._share > 0 and self._tell is not None:
+            total = max(int(self._faces / self._share), self._faces)
+            self._share = self._faces / total
+            self._tell(self._faces, total)
+
+
 class Progress:
     """Turns rows that loops have begun into faces made so far.
 

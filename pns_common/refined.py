@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.errors import MeshError
-from pns_common.kernels import loop as kernels
 from pns_common.mesh.mesh import LARGEST_COORDINATE, Mesh, as_html
 from pns_common.mesh.reference_length import measure_reference_length
+from pns_common.mesh.rows import extent
 from pns_common.mesh.selection import Selected
 from pns_common.mesh.topology import Topology
 from pns_common.operator.formula import Additions
@@ -46,7 +46,7 @@ class Step:
         base_points = None if self.added is None else self.added.base_points
         quads, shift = self.level.base.polygons, crease_shift(self.level, self.points)
         angles = child_angles(mesh, self.points, base_points, blocks, quads)
-        return level_report(mesh, self.added, angles, shift, quads)
+        return level_report(mesh, self.added, *angles, shift, quads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,7 @@ def crease_shift(level: Level, placed: Float[np.ndarray, "W 3"]) -> float | None
 def check_coordinates(points: Float[np.ndarray, "W 3"], blocks: Blocks) -> None:
     """Raise MeshError where refined coordinates are too large, or not numbers."""
     sizes = blocks.quiet().run(
-        len(points), lambda begin, end: kernels.largest_coordinate(points, begin, end)
+        len(points), lambda begin, end: np.abs(extent(points[begin:end])).max()
     )
     # Written so that NaN fails it too.
     if not all(size <= LARGEST_COORDINATE for size in sizes):

@@ -13,16 +13,15 @@ from pns_common.errors import MeshError, ParameterError
 from pns_common.memory import keep_freed_memory, memory_here
 from pns_common.mesh.creases import Creases, chosen_creases, one_of_creases
 from pns_common.mesh.mesh import Mesh, check_is_mesh
-from pns_common.mesh.quads import QUAD
 from pns_common.mesh.reference_length import measure_reference_length
 from pns_common.mesh.selection import chosen_faces, select
-from pns_common.mesh.topology import TRIANGLE
+from pns_common.mesh.topology import QUAD, TRIANGLE
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import NAMES, Scheme, named_scheme
 from pns_common.operator.sharpness import with_sharp_edges
 from pns_common.parallel import Blocks, available_threads, no_progress
 from pns_common.parameters import is_bool, is_number, is_whole
-from pns_common.progress import Progress
+from pns_common.progress import Progress, Shares
 from pns_common.refined import Refinement, Step, check_coordinates
 from pns_common.schemes.limit import limit_positions
 
@@ -46,6 +45,7 @@ def refine(
     reference_length: float | str = "auto",
     *,
     tolerance: float | str | None = None,
+    angle: float | None = None,
     max_faces: int | None = None,
     max_edge_length: float | str | None = None,
     limit: bool = True,
@@ -66,14 +66,16 @@ def refine(
             "catmull-clark" or "pns", the default model. The default model refines triangles by
             Loop's scheme; a mesh with other faces goes to its companion over Catmull–Clark.
         levels: number of steps, 1 … 16; fewer where the result cannot fit into the memory here.
-            None: 2, or with a tolerance or one of the next two 6, of which each face takes as many
-            as it needs.
+            None: 2, or with a tolerance or one of the next three 6, of which each face takes as
+            many as it needs.
         reference_length: R, the unit of length of the budget: the largest curvature that the
             budget C can represent is 8 C / R. "auto" measures the mesh; 1 is the paper's absolute
             unit. It is fixed here for all levels: pass the first call's R when calling again.
         tolerance: split faces that may be farther from the limit surface, alone; in the mesh's
             units, or a share of the diagonal of its box, as "0.1%". The result is an
             ``AdaptiveRefinement``: faces of several levels, which meet without gaps. For triangles.
+        angle: split faces over which shading turns by more degrees: between the normals of the
+            limit surface at their corners and where the next level has vertices on their sides.
         max_faces: split the faces of the largest distance first, and end before there are more.
         max_edge_length: split faces with longer sides; as ``tolerance``.
         limit: put the last level's vertices where the base scheme would take them if it were
@@ -92,7 +94,8 @@ def refine(
             vertices stay. The report is that of refining all.
         threads: worker threads, default all processors; the result does not depend on it.
         progress: called with (faces made so far, faces made in the end), also inside levels, from
-            any thread, one at a time; an exception that it raises ends the refinement.
+            any thread, one at a time; an exception that it raises ends the refinement. With a
+            tolerance or the like both are estimates, of which the quotient never falls.
 
     Raises:
         ParameterError: an argument out of range, or a crease that is no edge.
@@ -106,13 +109,14 @@ def refine(
     """
     check_is_mesh(mesh)
     scheme = scheme_for(mesh, scheme)
-    if not (tolerance is None and max_faces is None and max_edge_length is None):
+    goals = tolerance, angle, max_faces, max_edge_length
+    if any(goal is not None for goal in goals):
         return _refine_to_goal(
             mesh,
             scheme,
             levels,
             reference_length,
-            (tolerance, max_faces, max_edge_length),
+            goals,
             limit=limit,
             creases=one_of_creases(creases, crease),
             border=border,
@@ -179,7 +183,7 @@ def _refine_to_goal(
     scheme: Scheme,
     levels: SupportsIndex | None,
     reference_length: float | str,
-    goals: tuple[Any, Any, Any],
+    goals: tuple[Any, Any, Any, Any],
     *,
     limit: bool,
     creases: Integer[np.ndarray, "N 2"] | Creases | str | None,
@@ -189,9 +193,9 @@ def _refine_to_goal(
     progress: Callable[[int, int], None] | None,
 ) -> Refinement:
     """Refine a mesh of triangles until a goal is reached; arguments as of ``refine``."""
-    from pns_common.adaptive.refine import goal_of, refine_to_goal
+    from pns_common.adaptive.refine import LEARNED, goal_of, refine_to_goal
 
-    given = "a tolerance, max_faces or max_edge_length"
+    given = "a tolerance, angle, max_faces or max_edge_length"
     if scheme.base.polygons:
         expected = f"loop or pns on triangles with {given}: polygons are refined by whole levels"
         raise ParameterError("scheme", scheme.name, expected=expected)
@@ -202,23 +206,26 @@ def _refine_to_goal(
         raise ParameterError("limit", limit, expected=f"True with {given}")
     if faces is not None:
         raise ParameterError("faces", "given", expected=f"None with {given}")
+    if progress is not None and not callable(progress):
+        raise ParameterError("progress", progress, expected=PROGRESS)
     deepest = levels_given(DEFAULT_DEEPEST if levels is None else levels)
     goal = goal_of(mesh, *goals)
     length = _reference_length(mesh, reference_length, measured=scheme.rule is not None)
     kept = chosen_creases(creases, scheme.creases)
     kept = kept if border is None else replace(kept, border=border)
-    if progress is not None and not callable(progress):
-        raise ParameterError("progress", progress, expected=PROGRESS)
-    blocks = Blocks(_threads(threads))
+    shares, faces = Shares(progress), mesh.face_count
+
+    def tell(done: int, total: int) -> None:
+        shares.reach(done / total, faces)
+
+    learns = scheme.acts_at(0) and bool(length)
+    told = _progress(4 * faces, 1, 1, False, tell if learns and progress else None)
+    blocks = Blocks(_threads(threads), no_progress if told is None else told.rows)
+    shares.part(0.0, LEARNED)
     level = Level(mesh.vertices, mesh.topology(blocks), scheme.base, length, blocks)
     level = with_sharp_edges(level, kept, scheme)
-
-    def tell(count: int) -> None:
-        if progress is not None:
-            progress(0, max(count, 1))
-
-    first = _step(level, scheme, 0) if scheme.acts_at(0) and length else None
-    made = refine_to_goal(level, first, scheme, kept, goal, deepest, tell)
+    first = _step(level, scheme, 0) if learns else None
+    made = refine_to_goal(level, first, scheme, kept, goal, deepest, shares)
     if progress is not None:
         progress(made.mesh.face_count, made.mesh.face_count)
     return made

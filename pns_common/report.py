@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import children, connectivity
-from pns_common.kernels import quads as of_quads
-from pns_common.mesh.topology import EdgeClass, Topology
+from pns_common.mesh.normals import face_normals
+from pns_common.mesh.rows import dot
+from pns_common.mesh.topology import EdgeClass, Topology, quad_faces, split_faces
 from pns_common.operator.formula import Additions
 from pns_common.parallel import Blocks
 
@@ -106,16 +106,19 @@ class AdaptiveReport(TypedDict):
 
     ``faces_by_level`` counts faces by how often the control face was split, and ``distance_max`` is
     the largest bound of a face's distance from the limit surface: above ``tolerance`` only where
-    the deepest level did not suffice, or ``max_faces`` ended it.
+    the deepest level did not suffice, or ``max_faces`` ended it. ``angle_max`` is the largest
+    measured angle between normals of a face, in degrees; None where no angle was asked for.
     """
 
     tolerance: float | None
+    angle: float | None
     max_edge_length: float | None
     max_faces: int | None
     vertices: int
     faces: int
     faces_by_level: list[int]
     distance_max: float
+    angle_max: float | None
 
 
 class Report(LimitDistances):
@@ -138,22 +141,14 @@ class Report(LimitDistances):
     adaptive: NotRequired[AdaptiveReport]
 
 
-@dataclass(frozen=True)
-class ChildAngles:
-    """Number of flipped children, and the largest angle between children in radians."""
-
-    flipped: int
-    normal_jump_max: float
-
-
 def child_angles(
     parent: Topology,
     points: Float[np.ndarray, "W 3"],
     base_points: Float[np.ndarray, "W 3"] | None,
     blocks: Blocks,
     quads: bool,
-) -> ChildAngles:
-    """Measure the children of a mesh's faces.
+) -> tuple[int, float]:
+    """Return how many children are flipped, and the largest angle between children in radians.
 
     Args:
         parent: the mesh that was split.
@@ -162,72 +157,26 @@ def child_angles(
         blocks: how work is shared.
         quads: whether each corner became a quad; else each triangle four.
     """
-    normals = _child_normals(parent, points, blocks, quads)
-    smooth_class = parent.edge_class
+    faces = quad_faces(parent, blocks) if quads else split_faces(parent, blocks)
+    normals, smooth = face_normals(points, faces, blocks), parent.edge_class
     if len(parent.soft):
-        smooth_class = np.where(parent.is_sharp, EdgeClass.CREASE, smooth_class).astype(np.int8)
-    of_mesh = parent.half_edges, smooth_class
-    if quads:
-        corners = parent.offsets, parent.face_of_corner
-        inside = blocks.run(
-            parent.face_count,
-            lambda begin, end: of_quads.largest_chord_inside(normals, parent.offsets, begin, end),
-        )
-        across = blocks.run(
-            len(parent.edges),
-            lambda begin, end: of_quads.largest_chord_across(
-                normals, *corners, *of_mesh, begin, end
-            ),
-        )
-    else:
-        inside = blocks.run(
-            parent.face_count,
-            lambda begin, end: children.largest_chord_inside(normals, begin, end),
-        )
-        across = blocks.run(
-            len(parent.edges),
-            lambda begin, end: children.largest_chord_across(normals, *of_mesh, begin, end),
-        )
+        smooth = np.where(parent.is_sharp, EdgeClass.CREASE, smooth).astype(np.int8)
+    read = parent.connectivity._replace(edge_class=smooth), quads, normals
+    inside = blocks.run(parent.face_count, children.largest_chord_inside, *read)
+    across = blocks.run(len(parent.edges), children.largest_chord_across, *read)
     flipped = 0
     if base_points is not None:
-        others = _child_normals(parent, base_points, blocks, quads)
-        flipped = sum(
-            blocks.run(
-                len(normals),
-                lambda begin, end: children.opposed_normals(normals, others, begin, end),
-            )
-        )
+        others = face_normals(base_points, faces, blocks)
+        flipped = int(np.count_nonzero(dot(normals, others) < 0))
     chord = max(*inside, *across, 0.0)
-    return ChildAngles(int(flipped), 2 * math.asin(min(math.sqrt(chord) / 2, 1.0)))
-
-
-def _child_normals(
-    parent: Topology, points: Float[np.ndarray, "W 3"], blocks: Blocks, quads: bool
-) -> Float[np.ndarray, "C 3"]:
-    count = parent.vertex_count
-    if quads:
-        normals = np.empty((len(parent.corners), 3))
-        of_faces = parent.corners, parent.offsets, parent.corner_edges
-        ends = count, count + len(parent.edges)
-        blocks.run(
-            parent.face_count,
-            lambda begin, end: of_quads.child_normals(
-                points, *of_faces, *ends, begin, end, normals
-            ),
-        )
-        return normals
-    normals = np.empty((4 * parent.face_count, 3))
-    read = points, parent.faces, parent.face_edges, count
-    blocks.run(
-        parent.face_count, lambda begin, end: children.child_normals(*read, begin, end, normals)
-    )
-    return normals
+    return flipped, 2 * math.asin(min(math.sqrt(chord) / 2, 1.0))
 
 
 def level_report(
     parent: Topology,
     added: Additions | None,
-    angles: ChildAngles,
+    flipped: int,
+    jump: float,
     crease_shift: float | None,
     quads: bool,
 ) -> LevelReport:
@@ -242,29 +191,22 @@ def level_report(
         "faces": len(parent.corners) if quads else 4 * parent.face_count,
         "edges": edge_counts(parent),
         "degenerate_frames": 0 if added is None else added.degenerate,
-        "flipped_faces": angles.flipped,
+        "flipped_faces": flipped,
         "proximity_ratio": _ratio_summary(ratio),
         "gate": _gate_summary(gate),
-        "normal_jump_max": angles.normal_jump_max,
+        "normal_jump_max": jump,
     }
     if added is not None:
         shut = _shut(gate)
         if added.corrected is not None:
             vertex_gate = _of(added.gate[:count], added.corrected)
-            report["vertex_rule"] = {
-                "vertices": int(added.corrected.sum()),
-                "proximity_ratio": _ratio_summary(_of(added.ratio[:count], added.corrected)),
-                "gate": _gate_summary(vertex_gate),
-            }
+            ratio = _of(added.ratio[:count], added.corrected)
+            report["vertex_rule"] = _vertex_summary(ratio, vertex_gate)
             shut += _shut(vertex_gate)
             if quads:
-                first = count + len(parent.edges)
-                report["face_rule"] = {
-                    "vertices": parent.face_count,
-                    "proximity_ratio": _ratio_summary(added.ratio[first:]),
-                    "gate": _gate_summary(added.gate[first:]),
-                }
-                shut += _shut(added.gate[first:])
+                ratio, gate = (rows[of_edges.stop :] for rows in (added.ratio, added.gate))
+                report["face_rule"] = _vertex_summary(ratio, gate)
+                shut += _shut(gate)
         report["displacement_max"] = longest(added.displacement)
         report["envelope_max"] = float(added.bound.max(initial=0))
         report["shut"] = shut
@@ -319,6 +261,11 @@ def _of(
     """Return some of the values; no copy where they are all."""
     every = rows.all() if rows.dtype == bool else len(rows) == len(values)
     return values if every else values[rows]
+
+
+def _vertex_summary(ratio: Float[np.ndarray, " N"], gate: Float[np.ndarray, " N"]) -> VertexSummary:
+    ratios, gates = _ratio_summary(ratio), _gate_summary(gate)
+    return {"vertices": len(gate), "proximity_ratio": ratios, "gate": gates}
 
 
 def _shut(gate: Float[np.ndarray, " N"]) -> int:

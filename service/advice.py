@@ -13,12 +13,15 @@ from pns_common.mesh.creases import Creases, edge_cosines
 from pns_common.mesh.mesh import Mesh
 from pns_common.report import LevelReport
 
+from .changes import Advice
 from .options import Options
 
 # Plane faces in single precision turn by less.
 BENT = math.radians(0.5)
 # Degrees: facets of a round shape rarely bend by more than the first, or by the second at all.
 STEEP, STEEPEST = 40, 60
+# Options that help, as HTTP spells them.
+ROUND, CRISP, WELD = "crease=off", f"crease=angle:{STEEP}", "weld_tolerance=0.001"
 # A weight between these is neither sharp nor smooth.
 UNDECIDED = 0.2, 0.8
 # Doubt is spoken of from this many edges on, if they are this share of the steep ones.
@@ -92,31 +95,34 @@ def count_bends(
     ]
 
 
-def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[str]:
+def advice_on(levels: Sequence[LevelReport], bends: Bends) -> list[Advice]:
     """Return what is in doubt, or why little changed, each with the option to set."""
     if not levels:
         return []
     edges = levels[0]["edges"]
     total = sum(edges.get(kind, 0) for kind in ("interior", "boundary", "irregular", "crease"))
     if bends.smoothed >= MANY:
-        return [
+        told = (
             f"no edge is kept sharp where {bends.smoothed:,} bend by more than {STEEPEST} degrees: "
-            f"use crease=angle:{STEEP} for flat sides with crisp edges"
-        ]
+            f"use {CRISP} for flat sides with crisp edges"
+        )
+        return [Advice(told, (CRISP,))]
     if bends.undecided >= max(MANY, SHARE * bends.steep):
-        return [
+        told = (
             f"{bends.undecided:,} of {bends.steep:,} steep edges are neither clearly sharp nor "
-            f"clearly round: use crease=off for a body that is round throughout, or "
-            f"crease=angle:{STEEP} for flat sides with crisp edges"
-        ]
+            f"clearly round: use {ROUND} for a body that is round throughout, or {CRISP} for flat "
+            "sides with crisp edges"
+        )
+        return [Advice(told, (ROUND, CRISP))]
     if edges["boundary"] >= MOST_OPEN * total and not _is_one_face(levels[0]):
-        return [
+        told = (
             f"{edges['boundary']:,} of {total:,} edges are open borders, and faces that only touch "
-            "stay apart: use weld_tolerance=0.001 to join vertices that nearly coincide"
-        ]
+            f"stay apart: use {WELD} to join vertices that nearly coincide"
+        )
+        return [Advice(told, (WELD,))]
     flat = levels[-1]["normal_jump_max"] < BENT
     if flat and not edges.get("crease") and not edges.get("soft"):
-        return ["the shape is flat: refining adds faces and rounds outlines, nothing else"]
+        return [Advice("the shape is flat: refining adds faces and rounds outlines, nothing else")]
     return []
 
 

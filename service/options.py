@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from pns_common.scheme_names import BASE_SCHEMES
 
@@ -31,13 +31,21 @@ Compression = Literal["none", "draco", "meshopt"]
 # A weld further than a hundredth of R is a different tool: it would take features away.
 MAX_WELD_TOLERANCE = 0.01
 # `angle:` is followed by degrees.
-CREASE_PATTERN = r"auto|off|normals|angle:\d{1,3}(\.\d{1,6})?"
+_CREASE = r"^(auto|off|normals|angle:\d{1,3}(\.\d{1,6})?)$"
 
 # A length in the file's units, or a share of the mesh's diagonal; empty: none.
-LENGTH_PATTERN = r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?%?"
+_LENGTH = r"^(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?%?$"
 
 # The upload, its decoded JSON, and its bytes again in the answer.
 BYTES_PER_INPUT_BYTE = 4
+
+# Groups of `--help`, in their order.
+EVERYDAY, FILES, MORE, RESEARCH = "Everyday", "Files", "More", "Research"
+
+
+def _told(panel: str, metavar: str | None = None, **bounds: Any) -> dict[str, Any]:
+    """Return how the command line shows an option, and what its type does not say of its bounds."""
+    return {"panel": panel, "metavar": metavar, "bounds": bounds}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,45 +54,50 @@ class Options:
 
     `budget` is the dimensionless C (None: the model's own); `reference_length` is a length in the
     mesh's local coordinates, or "auto"; `weld_tolerance` is in units of R; `limit` puts the
-    vertices on the limit surface, with its normals; `tolerance`, `max_faces` and `max_edge_length`
-    refine faces only where that is needed, by up to MAX_LEVELS levels whatever `levels` are;
-    `polygons` joins triangles of a glTF;
+    vertices on the limit surface, with its normals; `tolerance`, `angle`, `max_faces` and
+    `max_edge_length` refine faces only where that is needed, by up to MAX_LEVELS levels whatever
+    `levels` are; `polygons` joins triangles of a glTF;
     `material` and `group` name the faces to refine (None: all). Raises InvalidParameter.
     """
 
-    levels: int = DEFAULT_LEVELS
-    scheme: SchemeName = "auto"
-    budget: float | None = None
-    reference_length: float | Literal["auto"] = "auto"
-    diagnostics: Diagnostics = "summary"
-    uv: UvRule = "linear"
-    normals: NormalRule = "auto"
-    crease: str = "auto"
-    weld: WeldRule = "position"
-    weld_tolerance: float = 0.0
-    border: BorderRule = "smooth"
-    polygons: PolygonRule = "off"
-    material: str | None = None
-    group: str | None = None
-    compress: Compression = "none"
-    limit: bool = True
-    tolerance: str | None = None
-    max_faces: int | None = None
-    max_edge_length: str | None = None
+    levels: int = field(default=DEFAULT_LEVELS, metadata=_told(EVERYDAY, ge=1, le=MAX_LEVELS))
+    tolerance: str | None = field(default=None, metadata=_told(EVERYDAY, "X|X%", pattern=_LENGTH))
+    angle: float | None = field(default=None, metadata=_told(EVERYDAY, "DEG", gt=0, lt=180))
+    max_faces: int | None = field(default=None, metadata=_told(EVERYDAY, "N", ge=1))
+    max_edge_length: str | None = field(
+        default=None, metadata=_told(EVERYDAY, "X|X%", pattern=_LENGTH)
+    )
+    crease: str = field(
+        default="auto", metadata=_told(EVERYDAY, "auto|off|normals|angle:DEG", pattern=_CREASE)
+    )
+    scheme: SchemeName = field(default="auto", metadata=_told(EVERYDAY))
+    limit: bool = field(default=True, metadata=_told(EVERYDAY))
+    normals: NormalRule = field(default="auto", metadata=_told(EVERYDAY))
+    uv: UvRule = field(default="linear", metadata=_told(MORE))
+    weld: WeldRule = field(default="position", metadata=_told(MORE))
+    weld_tolerance: float = field(
+        default=0.0, metadata=_told(MORE, "X", ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)
+    )
+    border: BorderRule = field(default="smooth", metadata=_told(MORE))
+    polygons: PolygonRule = field(default="off", metadata=_told(MORE))
+    material: str | None = field(default=None, metadata=_told(MORE, "NAME"))
+    group: str | None = field(default=None, metadata=_told(MORE, "NAME"))
+    compress: Compression = field(default="none", metadata=_told(FILES))
+    budget: float | None = field(
+        default=None, metadata=_told(RESEARCH, "C", ge=0, allow_inf_nan=False)
+    )
+    reference_length: float | Literal["auto"] = field(
+        default="auto", metadata=_told(RESEARCH, "auto|X")
+    )
+    diagnostics: Diagnostics = field(default="summary", metadata=_told(RESEARCH))
 
     def __post_init__(self) -> None:
         if not 1 <= self.levels <= MAX_LEVELS:
             raise InvalidParameter(
                 "levels", f"levels is {self.levels}; it must be 1 to {MAX_LEVELS}"
             )
-        check_choice("scheme", self.scheme, get_args(SchemeName))
-        check_choice("diagnostics", self.diagnostics, get_args(Diagnostics))
-        check_choice("compress", self.compress, get_args(Compression))
-        check_choice("uv", self.uv, get_args(UvRule))
-        check_choice("normals", self.normals, get_args(NormalRule))
-        check_choice("weld", self.weld, get_args(WeldRule))
-        check_choice("border", self.border, get_args(BorderRule))
-        check_choice("polygons", self.polygons, get_args(PolygonRule))
+        for name, choices in _CHOICES.items():
+            check_choice(name, getattr(self, name), choices)
         if self.budget is not None and not (math.isfinite(self.budget) and self.budget >= 0):
             raise InvalidParameter("budget", "budget must be a finite number, zero or more")
         if self.reference_length != "auto" and not (
@@ -93,7 +106,7 @@ class Options:
             raise InvalidParameter(
                 "reference_length", "reference_length must be 'auto' or a finite positive number"
             )
-        if not re.fullmatch(CREASE_PATTERN, self.crease) or not (self.crease_angle or 0) <= math.pi:
+        if not re.fullmatch(_CREASE, self.crease) or not (self.crease_angle or 0) <= math.pi:
             raise InvalidParameter(
                 "crease",
                 "crease must be 'auto', 'off', 'normals' or 'angle:' and 0 to 180 degrees, "
@@ -114,9 +127,12 @@ class Options:
             given = getattr(self, name)
             if given is None:
                 continue
-            if not re.fullmatch(LENGTH_PATTERN, given) or float(given.rstrip("%")) <= 0:
+            if not re.fullmatch(_LENGTH, given) or float(given.rstrip("%")) <= 0:
                 expected = "must be a length above 0, or a share of the diagonal, as in 0.1%"
                 raise InvalidParameter(name, f"{name} is {given}; it {expected}")
+        if self.angle is not None and not 0 < self.angle < 180:
+            expected = "must be degrees, above 0 and below 180"
+            raise InvalidParameter("angle", f"angle is {self.angle:g}; it {expected}")
         if self.max_faces is not None and self.max_faces < 1:
             raise InvalidParameter(
                 "max_faces", f"max_faces is {self.max_faces}; it must be above 0"
@@ -139,8 +155,14 @@ class Options:
     @property
     def goals(self) -> dict[str, Any]:
         """Goals of faces of several levels, as arguments of the library's refine."""
-        names = ("tolerance", "max_faces", "max_edge_length")
+        names = ("tolerance", "angle", "max_faces", "max_edge_length")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    def faces_after(self, triangles: int) -> int:
+        """Return how many faces triangles become; of a goal the most, or the least if not known."""
+        if self.max_faces is not None:
+            return max(self.max_faces, triangles)
+        return triangles if self.goals else triangles * 4**self.levels
 
     @property
     def learns(self) -> bool:
@@ -167,7 +189,7 @@ class Options:
 # What each says to users, of the command line and of HTTP.
 DESCRIPTIONS = {
     "levels": f"how fine, 1 to {MAX_LEVELS}: each level makes four faces of one. "
-    "Without effect with tolerance, max_faces or max_edge_length",
+    "Without effect with tolerance, angle, max_faces or max_edge_length",
     "scheme": "the rules. auto and pns: the learned ones; of polygons that the model has no rules "
     "for auto makes quads by Catmull-Clark, and pns triangles. loop: the classic rules for "
     "triangles; polygons are cut. catmull-clark: the classic rules for polygons",
@@ -203,9 +225,17 @@ DESCRIPTIONS = {
     "tolerance": "refine faces only where they may be farther from the limit surface, by up to "
     f"{MAX_LEVELS} levels: a length in the file's units, or as in 0.1% a share of each mesh's "
     "diagonal. Polygons are cut into triangles",
+    "angle": "refine faces only where shading turns over them by more degrees, measured at their "
+    "corners and where finer faces have vertices on their sides; sharp edges apart, as tolerance",
     "max_faces": "most faces of the file: those farthest from the limit surface are refined first. "
     "Of several meshes in a glTF each has the share that it has before",
     "max_edge_length": "refine faces only where their sides are longer; as tolerance",
+}
+
+_CHOICES = {
+    name: get_args(hint)
+    for name, hint in get_type_hints(Options).items()
+    if get_origin(hint) is Literal
 }
 
 

@@ -3,58 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from pns_common.operator.scheme import Scheme
 from pns_common.report import EdgeCounts, GateSummary, LevelReport, RatioSummary, Report
 
 from .advice import NO_BENDS, Bends, advice_on
-from .errors import shortened, shortened_pointer
-
-# For changes that begin so: whether they are harmless, or what to do.
-HINTS = {
-    "border vertices lie within": "use weld_tolerance=0.001 if the result has gaps",
-    "bytes behind the": "harmless",
-    "corners with a normal that points away": "if they show as dark spots use normals=smooth",
-    "degenerate faces dropped": "harmless, they have no area",
-    "Draco compression decoded": "harmless, compress=draco packs the result again",
-    "embedded": "harmless, the result needs no file beside it",
-    "faces of fewer than three vertices": "harmless",
-    "faces too far from the origin": "move the mesh to the origin, or it will look toothed",
-    "found, and left": "harmless",
-    "joined into one": "harmless",
-    "meshopt compression decoded": "harmless, compress=meshopt packs the result again",
-    "nodes joined": "harmless",
-    "non-manifold edge": "harmless unless the faces come apart there",
-    "quantised attributes": "harmless",
-    "refined vertices that lost their lightest joints, at most 1 %": "harmless",
-    "refined vertices that lost": "if they move wrongly add JOINTS_1 and WEIGHTS_1",
-    "sparse accessors": "harmless",
-    "triangle": "harmless",
-    "vertices dropped": "harmless",
-}
-
-
-def hint_on(what: str) -> str:
-    """Return whether a change is harmless or what to do about it; empty where it says so itself."""
-    return next((hint for begins, hint in HINTS.items() if what.startswith(begins)), "")
-
-
-@dataclass(frozen=True)
-class Change:
-    """Something lost or changed beside the geometry: where (a JSON pointer), what, how often.
-
-    Of names without end, which an upload may hold, a beginning is told.
-    """
-
-    pointer: str
-    what: str
-    count: int
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pointer", shortened_pointer(self.pointer))
-        object.__setattr__(self, "what", shortened(self.what))
+from .changes import Change, changes_of
+from .errors import shortened
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,18 +72,9 @@ def build_report(
         },
         "dropped": dropped(sum(result.degenerate for result in results), unused_vertices),
         **changes_of(changes),
-        "advice": advice_on(totals, bends),
+        "advice": [each.as_entry() for each in advice_on(totals, bends)],
         "levels": totals,
         "meshes": [_mesh(result) for result in results],
-    }
-
-
-def changes_of(changes: Sequence[Change]) -> dict[str, Any]:
-    """Return the report's entries on changes, and what to do about those that do not say it."""
-    hints = {change.what: hint_on(change.what) for change in changes}
-    return {
-        "changes": [asdict(change) for change in changes],
-        "hints": {what: hint for what, hint in hints.items() if hint},
     }
 
 

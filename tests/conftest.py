@@ -70,6 +70,7 @@ KINDS = {
 # What takes longest comes first, so that several test processes end together.
 LONGEST = (
     "train/test_experiments.py",
+    "library/test_kernels.py",
     "service/http/test_serve.py",
     "test_wheel.py",
     "conformance/test_conformance.py",

@@ -266,13 +266,14 @@ def later(mesh: Topology, *, inherit: bool) -> Topology:
     """Return the same stars with the sharpness that they have a level later."""
     if inherit and not len(mesh.wear) and not len(mesh.vertex_sharpness):
         return mesh
+    made = mesh
     if not inherit:
         weights = mesh.soft_corners_of_split(mesh.vertex_count, inherit=False)
-        sharp = mesh.vertex_sharpness
-        mesh = replace(mesh.without_creases(), soft_corners=weights, vertex_sharpness=sharp)
-    mesh = replace(mesh, vertex_sharpness=mesh.worn_vertices(mesh.vertex_count))
+        made = replace(mesh.without_creases(), soft_corners=weights)
+    made = replace(made, vertex_sharpness=mesh.worn_vertices(mesh.vertex_count))
     halves = np.arange(len(mesh.edges))[:, None].repeat(2, axis=1)
-    return mesh.worn(mesh, halves)
+    # What wears off does so whatever becomes of other edges.
+    return made.worn(mesh, halves, inherit=inherit)
 
 
 def unsettled(mesh: Topology, levels: Levels) -> Bool[np.ndarray, " V"]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,6 +23,7 @@ from pns_common.adaptive.tree import (
     edges_of,
     sides_of,
 )
+from pns_common.adaptive.turning import degrees
 from pns_common.errors import MeshError, ParameterError
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh
@@ -31,6 +31,7 @@ from pns_common.mesh.rows import marked
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
+from pns_common.progress import Shares
 from pns_common.refined import Refinement, Step, check_coordinates, reference_length_of
 from pns_common.report import Report
 from pns_common.schemes.limit import limit_normals, limit_positions
@@ -41,6 +42,9 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
 # Errors whose ratio is this near to 1 are equal: networks compute in single precision.
 EQUAL = 1e-4
+# Shares of the work, roughly: until the learned level is there, until trees have all their faces
+# but those that closing adds, and until those to split are chosen.
+LEARNED, GROWN, CHOSEN = 0.15, 0.65, 0.75
 # The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
 # are 2 k + 1 and 2 k + 2.
 HALVES = 0.5 * np.array(
@@ -153,6 +157,8 @@ class AdaptiveRefinement(Refinement):
         face_levels: (F,) how often each face's parent was split.
         distances: (F,) no point of the part of the limit surface that a face stands for is farther
             from its plane, in the mesh's units; at sharp edges none from the edge.
+        angles: (F,) how far shading turns over each face, in degrees; 0 where no angle was asked
+            for.
         goal: what was asked for.
         trail: how values of control vertices become those of refined ones.
         control: the control mesh with its sharp edges.
@@ -162,6 +168,7 @@ class AdaptiveRefinement(Refinement):
     halves: Integer[np.ndarray, " F"] = field(repr=False)
     face_levels: Integer[np.ndarray, " F"] = field(repr=False)
     distances: Float[np.ndarray, " F"] = field(repr=False)
+    angles: Float[np.ndarray, " F"] = field(repr=False)
     goal: Goal
     trail: Trail = field(repr=False)
     control: Level = field(repr=False)
@@ -225,12 +232,16 @@ class AdaptiveRefinement(Refinement):
             **self._report_of(learned, self.control.topology),
             "adaptive": {
                 "tolerance": self.goal.tolerance,
+                "angle": self.goal.angle,
                 "max_edge_length": self.goal.max_edge_length,
                 "max_faces": self.goal.max_faces,
                 "vertices": len(self.mesh.vertices),
                 "faces": self.mesh.face_count,
                 "faces_by_level": levels.tolist(),
                 "distance_max": float(self.distances.max(initial=0.0)),
+                "angle_max": None
+                if self.goal.angle is None
+                else float(self.angles.max(initial=0.0)),
             },
         }
 
@@ -242,7 +253,7 @@ def refine_to_goal(
     creases: Creases,
     goal: Goal,
     deepest: int,
-    tell: Callable[[int], None],
+    shares: Shares,
 ) -> AdaptiveRefinement:
     """Refine a mesh to a goal.
 
@@ -252,36 +263,41 @@ def refine_to_goal(
         scheme, creases: those of the refinement.
         goal: what is to be reached.
         deepest: the most levels that may be used.
-        tell: called with numbers of faces, at each level of each attempt.
+        shares: what reports progress.
     """
     mesh = level.topology
     levels = Levels(scheme.base, level.blocks.quiet(), deepest, creases.levels)
     numbers, faces = np.arange(len(level.points)), np.arange(mesh.face_count)
     control = Part(0, mesh, level.points, numbers, faces, np.ones(len(faces), dtype=bool))
-    start = Start(control, None, levels, goal, tell)
+    start = Start(control, None, levels, goal, shares.reach)
     if first is not None:
         every = np.arange(len(first.points))
         topology = scheme.base.split(mesh, levels.blocks, inherit=levels.inherit(1))
         codes, there = np.arange(CHILDREN * len(faces)), np.ones(CHILDREN * len(faces), dtype=bool)
         finer = Part(1, topology, first.points, every, codes, there)
         start = replace(start, first=(finer, Refined(numbers, mesh, every)))
-    tree = _with_so_many(start) if goal.max_faces is not None else _near_enough(start)
+    shares.part(LEARNED if start.first is not None else 0.0, GROWN)
+    find = _near_enough if goal.max_faces is None else _with_so_many
+    tree = find(start, shares)
     return _written(tree, level, first, scheme, levels, goal)
 
 
-def _near_enough(start: Start) -> Tree:
+def _near_enough(start: Start, shares: Shares) -> Tree:
     """Return a tree that reaches the tolerance, and whose faces can be cut to meet."""
-    tree = start.grow(1.0)
+    tree, left = start.grow(1.0), 1 - GROWN
     while True:
         closed = tree.closed(tree.split, start.goal.tolerance)
         if _same(tree.split, closed):
             return tree
         forced, known = tree.codes(closed), tree.measured
         del tree, closed
+        # Each time fewer faces are new.
+        shares.part(1 - left, 1 - left / 4)
+        left /= 4
         tree = start.grow(1.0, forced, known=known)
 
 
-def _with_so_many(start: Start) -> Tree:
+def _with_so_many(start: Start, shares: Shares) -> Tree:
     """Return a tree of so many faces as are asked for, or fewer."""
     goal, tree = start.goal, start.grow(np.inf)
     most, bounded = goal.max_faces or 0, goal.tolerance is not None or goal.max_edge_length
@@ -300,6 +316,7 @@ def _with_so_many(start: Start) -> Tree:
     high, more = len(order), made
     if made <= most:
         low = high
+    shares.part(GROWN, CHOSEN)
     while high - low > 1:
         # Faces are nearly proportional to splits; each third time the middle, so that it ends.
         turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
@@ -309,8 +326,10 @@ def _with_so_many(start: Start) -> Tree:
             low, fewer = middle, made
         else:
             high, more = middle, made
-    first = order[: _untied(errors, low)]
-    forced, known = tree.codes(tree.closed(_flagged(tree, first))), tree.measured
+        shares.reach(1 - (high - low).bit_length() / len(order).bit_length(), fewer)
+    shares.part(CHOSEN, 1.0)
+    first = _flagged(tree, order[: _untied(errors, low)])
+    forced, known = tree.codes(tree.closed(first)), tree.measured
     del tree
     return start.grow(threshold, forced, only=True, known=known)
 
@@ -382,9 +401,9 @@ def _written(
     made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
     keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    names, halves, distance, codes = (
+    names, halves, distance, turned, codes = (
         np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("names", "halves", "distances", "codes")
+        for name in ("names", "halves", "distances", "turns", "codes")
     )
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
@@ -410,6 +429,7 @@ def _written(
         halves=halves,
         face_levels=depths,
         distances=distance,
+        angles=degrees(turned),
         goal=goal,
         trail=Trail(steps, settled, rows, levels),
         control=level,
@@ -418,11 +438,12 @@ def _written(
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Faces of one level: names of corners, halves, distances, codes."""
+    """Faces of one level: names of corners, halves, distances, turns, codes."""
 
     names: Integer[np.ndarray, "F 3"]
     halves: Integer[np.ndarray, " F"]
     distances: Float[np.ndarray, " F"]
+    turns: Float[np.ndarray, " F"]
     codes: Integer[np.ndarray, " F"]
 
 
@@ -445,23 +466,27 @@ def _faces_of(tree: Tree, depth: int) -> _Faces:
     names, halves = names[at], halves[at]
     names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
     halves[firsts], halves[firsts + 1] = 2 * side + 1, 2 * side + 2
-    return _Faces(names, halves, distance[at], codes[at])
+    return _Faces(names, halves, distance[at], layer.turns[rows[at]], codes[at])
 
 
 # --- arguments ------------------------------------------------------------------------------------
 
 
-def goal_of(mesh: Mesh, tolerance: Any, max_faces: Any, max_edge_length: Any) -> Goal:
+def goal_of(mesh: Mesh, tolerance: Any, angle: Any, max_faces: Any, max_edge_length: Any) -> Goal:
     """Return what a refinement is to reach.
 
     Raises:
-        ParameterError: a length that is not above 0, or fewer faces than the mesh has.
+        ParameterError: a length or an angle that is not above 0, an angle of 180 degrees or more,
+            or fewer faces than the mesh has.
     """
     if max_faces is not None and not (is_whole(max_faces) and max_faces >= mesh.face_count):
         expected = f"a whole number, at least {mesh.face_count}: faces are split, never joined"
         raise ParameterError("max_faces", max_faces, expected=expected)
+    if angle is not None and not (is_number(angle) and 0 < float(angle) < 180):
+        raise ParameterError("angle", angle, expected="degrees, above 0 and below 180")
     return Goal(
         _length(mesh, "tolerance", tolerance),
+        None if angle is None else float(angle),
         _length(mesh, "max_edge_length", max_edge_length),
         None if max_faces is None else int(max_faces),
     )

@@ -8,7 +8,7 @@ choose, and the result does not depend on numbering.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,10 +23,13 @@ from pns_common.adaptive.parts import (
     Refined,
     Settled,
 )
+from pns_common.adaptive.turning import chord, turns
 from pns_common.kernels import connectivity as kernels
 from pns_common.mesh.rows import marked
 from pns_common.mesh.topology import Topology
 
+# Faces that are measured between two reports of progress.
+TOGETHER = 2**16
 # Errors that agree in so many digits are equal.
 DIGITS = 9
 Flags = Sequence[Bool[np.ndarray, " _"]]
@@ -39,16 +42,21 @@ class Goal:
 
     Attributes:
         tolerance: no face is to be farther from the limit surface.
+        angle: normals of no face are to turn more, in degrees.
         max_edge_length: no edge is to be longer.
         max_faces: so many faces at most, those of the largest errors split first.
     """
 
     tolerance: float | None = None
+    angle: float | None = None
     max_edge_length: float | None = None
     max_faces: int | None = None
 
     def errors(
-        self, distance: Float[np.ndarray, " N"], triangles: Float[np.ndarray, "N 3 3"]
+        self,
+        distance: Float[np.ndarray, " N"],
+        turns: Float[np.ndarray, " N"],
+        triangles: Float[np.ndarray, "N 3 3"],
     ) -> Float[np.ndarray, " N"]:
         """Return the errors of faces: above 1 where they are to be split.
 
@@ -57,6 +65,8 @@ class Goal:
         parts = list[np.ndarray]()
         if self.tolerance is not None:
             parts.append(distance / self.tolerance)
+        if self.angle is not None:
+            parts.append(turns / chord(self.angle))
         if self.max_edge_length is not None:
             sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
             parts.append(sides.max(axis=1) / self.max_edge_length)
@@ -70,7 +80,7 @@ class Layer:
     Attributes:
         part: the faces, and those around them.
         split: (F,) which faces are split.
-        errors, slabs: (F,), (F, 3) of those that exist; 0 elsewhere.
+        errors, slabs, turns: (F,), (F, 3), (F,) of those that exist; 0 elsewhere.
         middles: (E,) the name of the vertex on each edge at the next level, or NOT_THERE.
         step: from this level to the next; None at the last.
         settled: vertices that are in no level before.
@@ -80,6 +90,7 @@ class Layer:
     split: Bool[np.ndarray, " F"]
     errors: Float[np.ndarray, " F"]
     slabs: Float[np.ndarray, "F 3"]
+    turns: Float[np.ndarray, " F"]
     middles: Integer[np.ndarray, " E"]
     step: Refined | None
     settled: Sequence[Settled]
@@ -87,11 +98,12 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Faces of a level that exist: their codes, errors and slabs."""
+    """Faces of a level that exist: their codes, errors, slabs and turns."""
 
     codes: Integer[np.ndarray, " N"]
     errors: Float[np.ndarray, " N"]
     slabs: Float[np.ndarray, "N 3"]
+    turns: Float[np.ndarray, " N"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +131,7 @@ class Tree:
     def measured(self) -> Sequence[Measured]:
         """Measurements of faces, level by level: they take less memory than the tree."""
         return [
-            Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own])
+            Measured(layer.part.codes[own], layer.errors[own], layer.slabs[own], layer.turns[own])
             for layer in self.layers
             for own in [layer.part.exists]
         ]
@@ -201,14 +213,14 @@ class Start:
         first: the whole next level and the step to it, where it is made by more than masks.
         levels: the rules.
         goal: what is to be reached.
-        tell: called at each level with the number of its faces.
+        tell: called with the share of a tree that is grown, and the faces that it has.
     """
 
     control: Part
     first: tuple[Part, Refined] | None
     levels: Levels
     goal: Goal
-    tell: Callable[[int], None]
+    tell: Callable[[float, int], None]
 
     def grow(
         self,
@@ -226,10 +238,9 @@ class Start:
             only: split no others.
             known: faces that need not be measured again, level by level.
         """
-        part, names = self.control, len(self.control.points)
+        part, names, done = self.control, len(self.control.points), 0
         places, layers = np.full((names, 3), np.nan), list[Layer]()
         for depth in range(self.levels.deepest + 1):
-            self.tell(int(part.exists.sum()))
             finer, step, middles, settled = None, None, self._no_middles(part), list[Settled]()
             if self.first is not None and depth == 0:
                 finer, step = self.first
@@ -239,7 +250,12 @@ class Start:
             else:
                 settled = self._settle(part, places)
             old = known[depth] if depth < len(known) else None
-            errors, slabs = self._measured(part, places, finer, old)
+            there, count = int(part.exists.sum()), part.topology.face_count
+            measured = errors, _, _ = np.zeros(count), np.zeros((count, 3)), np.zeros(count)
+            seen, expected = 0, 0.0
+            for rows in self._measure(part, places, finer, old, measured):
+                seen, expected = seen + len(rows), expected + self._expected(errors[rows], depth)
+                self._tell(done + seen, done + there * expected / seen, done + there)
             split = part.exists & (errors > threshold) & (not only)
             if forced is not None and depth < len(forced):
                 split |= part.exists & np.isin(part.codes, forced[depth])
@@ -251,7 +267,8 @@ class Start:
                     finer, step, middles = self.levels.split(part, split, names)
                     places = _longer(places, len(step.topology.edges))
                 names = len(places)
-            layers.append(Layer(part, split, errors, slabs, middles, step, settled))
+            layers.append(Layer(part, split, *measured, middles, step, settled))
+            done += there - int(split.sum())
             if finer is None or not split.any():
                 break
             part = finer
@@ -270,36 +287,53 @@ class Start:
             places[own.names] = own.limits
         return made
 
-    def _measured(
+    def _measure(
         self,
         part: Part,
         places: Float[np.ndarray, "N 3"],
         finer: Part | None,
         known: Measured | None,
-    ) -> tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"]]:
-        """Return errors and slabs of faces that exist, of those of the next level if it is given.
+        to: tuple[Float[np.ndarray, " F"], Float[np.ndarray, "F 3"], Float[np.ndarray, " F"]],
+    ) -> Iterator[Integer[np.ndarray, " N"]]:
+        """Write errors, slabs and turns of faces that exist; yield which, as they are written.
 
-        Those that are known are not measured again.
+        They are measured on those of the next level if it is given. Those that are known are not
+        measured again.
         """
-        count = part.topology.face_count
-        errors, made, rows = np.zeros(count), np.zeros((count, 3)), np.flatnonzero(part.exists)
+        (errors, widths, turned), rows = to, np.flatnonzero(part.exists)
         if known is not None and len(known.codes):
             codes = part.codes[rows]
             there = np.minimum(np.searchsorted(known.codes, codes), len(known.codes) - 1)
             same = known.codes[there] == codes
-            errors[rows[same]], made[rows[same]] = (
-                known.errors[there][same],
-                known.slabs[there][same],
-            )
+            for own, old in zip(to, (known.errors, known.slabs, known.turns), strict=True):
+                own[rows[same]] = old[there[same]]
+            if same.any():
+                yield rows[same]
             rows = rows[~same]
-        if len(rows):
-            triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
-            of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
-            enough = self.goal.tolerance or 0.0
-            asked = triangles, folded(part)[rows], self.levels, int(deeper), enough
-            made[rows] = slabs(finer or part, of_finer, *asked)
-            errors[rows] = self.goal.errors(distances(made[rows]), triangles)
-        return errors, made
+        folds, enough = folded(part), self.goal.tolerance or 0.0
+        for begin in range(0, len(rows), TOGETHER):
+            some = rows[begin : begin + TOGETHER]
+            triangles, deeper = places[part.names[part.topology.faces[some]]], finer is not None
+            of_finer = CHILDREN * some[:, None] + np.arange(CHILDREN) if deeper else some
+            asked = triangles, folds[some], self.levels, int(deeper), enough
+            widths[some] = slabs(finer or part, of_finer, *asked)
+            if self.goal.angle is not None:
+                turned[some] = turns(part, finer, some, self.levels)
+            errors[some] = self.goal.errors(distances(widths[some]), turned[some], triangles)
+            yield some
+
+    def _expected(self, errors: Float[np.ndarray, " N"], depth: int) -> float:
+        """Return into how many faces some are going to be split, if four of one quarter errors."""
+        most = CHILDREN ** (self.levels.deepest - depth)
+        split = errors[errors > 1]
+        return len(errors) - len(split) + float(np.clip(split, min(CHILDREN, most), most).sum())
+
+    def _tell(self, done: int, expected: float, faces: int) -> None:
+        """Report progress: faces that are measured, of those that are expected or asked for."""
+        most = self.goal.max_faces
+        if most is not None:
+            expected, faces = most, min(faces, most)
+        self.tell(min(done / expected, 1.0), faces)
 
 
 def _longer(places: Float[np.ndarray, "N 3"], more: int) -> Float[np.ndarray, "M 3"]:

@@ -166,22 +166,36 @@ class Carrier:
 
     def at_corners(self, column: Column) -> Shaped[np.ndarray, " D *K"]:
         """Refine values at corners to those of the refined faces, one after the other."""
-        rows = _rows(column)
         if column.rule not in BLENDING:
-            return _stored(column, rows[self._corner_parents])
-        first = self.topologies[0]
+            return _stored(column, _rows(column)[self._corner_parents])
+        values, corners = self.at_points(column)
+        return values[corners]
+
+    def at_points(
+        self, column: Column
+    ) -> tuple[Shaped[np.ndarray, " P *K"], Integer[np.ndarray, " D"]]:
+        """Refine values at corners; return those of points of charts, and the corners' points."""
+        rows, first = _rows(column), self.topologies[0]
         points, at = chart_points(first.corners, rows if column.same is None else column.same)
-        keep = column.keep if column.rule is rules.smooth else "all"
-        surface = self.topologies
-        if keep == "all":  # nothing is sharp, where nothing is smooth
+        smooth = column.rule is rules.smooth and column.keep != "all"
+        if smooth:
+            charts = charts_of(points, self.topologies, self.base, self.blocks)
+        elif len(at) == first.vertex_count and np.array_equal(points, first.corners):
+            charts = self.topologies
+        else:  # nothing is sharp, where nothing is smooth
             faces = points, first.offsets
-            charts = level_topologies(faces, len(at), len(surface), base=self.base)
+            charts = level_topologies(faces, len(at), len(self.topologies), base=self.base)
+        values = rows[at]
+        if smooth:
+            values, corners = refine_charts(
+                values, charts, self.base, self.blocks, keep=column.keep, limit=self.limit
+            )
         else:
-            charts = charts_of(points, surface, self.base, self.blocks)
-        rows, faces = refine_charts(
-            rows[at], charts, self.base, self.blocks, keep=keep, limit=self.limit
-        )
-        return _stored(column, rows[faces.reshape(-1)])
+            rule = rules.linear if column.rule is rules.smooth else column.rule
+            for chart in charts:
+                values = rule(values, chart, self.base, self.blocks)
+            corners = self.base.faces(charts[-1], self.blocks, np.int64)
+        return _stored(column, values), corners.reshape(-1)
 
     def at_faces(self, column: Column) -> Shaped[np.ndarray, " G *K"]:
         """Return the values of the faces that the refined ones are parts of."""

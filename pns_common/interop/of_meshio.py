@@ -12,7 +12,8 @@ import numpy as np
 from pns_common.errors import MeshError
 from pns_common.interop.carried import NO_LINES, CarriedMesh
 from pns_common.mesh.mesh import fans
-from pns_common.mesh.quads import QUAD
+from pns_common.mesh.rows import ranges
+from pns_common.mesh.topology import QUAD
 
 FACES, LINE, VERTEX = frozenset({"triangle", "quad", "polygon"}), "line", "vertex"
 
@@ -127,6 +128,4 @@ def _descendants(cells: Any, parents: np.ndarray) -> np.ndarray:
     old = np.asarray([] if cells is None else cells, dtype=np.int64)
     # In the order of the set.
     starts = np.searchsorted(parents, old)
-    counts = np.searchsorted(parents, old, "right") - starts
-    firsts = np.repeat(starts - np.cumsum(counts) + counts, counts)
-    return firsts + np.arange(len(firsts))
+    return ranges(starts, np.searchsorted(parents, old, "right") - starts)

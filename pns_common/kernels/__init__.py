@@ -2,8 +2,9 @@
 
 Each module holds the loops of one subject. A loop is decorated with ``kernel``, and its parameters
 say their types: ``f8_2d`` is a C-contiguous array of float64 of two axes, ``int``, ``float`` and
-``bool`` are numbers; ``f4_2d | f8_2d`` stands for a loop each. The small functions of scalars and
-3-vectors that its body is made of are decorated with ``inlined`` and need no types.
+``bool`` are numbers, ``Connectivity`` is a mesh; ``f4_2d | f8_2d`` stands for a loop each. The
+small functions of scalars and 3-vectors that its body is made of are decorated with ``inlined`` and
+need no types.
 
 All loops are compiled when the package is built (ahead.py), into ``compiled``. Where that is
 missing, or older than a source here, or KERNELS_JIT=1 is set, numba compiles each loop at its first
@@ -24,7 +25,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 HERE = Path(__file__).parent
 # 1: let numba compile each loop at its first call; ahead.py says "ahead".
@@ -49,6 +50,19 @@ i4_1d, i4_2d = ArrayType("i4", 1), ArrayType("i4", 2)
 i8_1d, i8_2d = ArrayType("i8", 1), ArrayType("i8", 2)
 u4_1d, u4_2d = ArrayType("u4", 1), ArrayType("u4", 2)
 b1_1d, b1_2d = ArrayType("b1", 1), ArrayType("b1", 2)
+
+
+class Connectivity(NamedTuple):
+    """Faces with their edges, as ``mesh.topology.Topology`` has them."""
+
+    vertex_count: int
+    corners: u4_1d
+    offsets: i4_1d
+    face_of_corner: u4_1d
+    corner_edges: u4_1d
+    edges: u4_2d
+    half_edges: i4_2d
+    edge_class: i1_1d
 
 
 def sources_digest() -> str:

@@ -15,11 +15,11 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
-from itertools import product
+from itertools import count, product
 from multiprocessing import get_context
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, get_type_hints
 
 # Before numba is imported: code for every processor of the architecture, which gives the same bits,
 # and optimised once, here.
@@ -31,7 +31,7 @@ import llvmlite.binding as llvm
 import numpy as np
 from numba import carray, cfunc, from_dtype, types
 
-from pns_common.kernels import HERE, ArrayType, sources_digest
+from pns_common.kernels import HERE, ArrayType, Connectivity, sources_digest
 
 # Loops of a module are left to one process, which compiles what they share once.
 CHUNK = 8
@@ -63,6 +63,8 @@ MATHEMATICS = {
     "tan",
     "tanh",
 }
+# Types of a mesh's fields.
+FIELDS = tuple(get_type_hints(Connectivity).values())
 STORE = {"": "{}", "b": "n[0] = {}", "i": "n[0] = {}", "f": "x[0] = {}", "ii": "n[0], n[1] = {}"}
 
 
@@ -93,42 +95,38 @@ def compile_loop(module: str, name: str, given: tuple[Any, ...], to: Path) -> tu
     Returns its name for Python, its parameters and its result, as dispatch.c reads them.
     """
     loop = getattr(import_module(f"pns_common.kernels.{module}"), name)
-    result = RESULTS[_result(loop, given)]
-    read: list[str] = []
-    parameters, arrays, wholes, fractions = "", 0, 0, 0
-    for type_ in given:
+    loop.compile(tuple(map(_type, given)))
+    result = RESULTS[loop.nopython_signatures[-1].return_type]
+    parameters, places = list[str](), {kind: count() for kind in "pnx"}
+
+    def expression(type_: Any) -> str:
+        """Return what reads an argument in the entry."""
+        if type_ is Connectivity:
+            return f"Connectivity({', '.join(map(expression, FIELDS))})"
         if isinstance(type_, ArrayType):
-            shape = "".join(f"n[{wholes + axis}]," for axis in range(type_.axes))
-            read.append(f"carray(p[{arrays}], ({shape}), np.dtype('{type_.dtype}'))")
-            parameters += f"{type_.dtype}_{type_.axes}d, "
-            arrays, wholes = arrays + 1, wholes + type_.axes
-        elif type_ is float:
-            read.append(f"x[{fractions}]")
-            parameters, fractions = parameters + "float, ", fractions + 1
-        else:
-            read.append(f"n[{wholes}] != 0" if type_ is bool else f"n[{wholes}]")
-            parameters, wholes = parameters + f"{type_.__name__}, ", wholes + 1
-    made: dict[str, Any] = {"loop": loop, "carray": carray, "np": np}
-    called = STORE[result].format(f"loop({', '.join(read)})")
+            parameters.append(f"{type_.dtype}_{type_.axes}d, ")
+            shape = "".join(f"n[{next(places['n'])}]," for _ in range(type_.axes))
+            return f"carray(p[{next(places['p'])}], ({shape}), np.dtype('{type_.dtype}'))"
+        parameters.append(f"{type_.__name__}, ")
+        if type_ is float:
+            return f"x[{next(places['x'])}]"
+        return f"n[{next(places['n'])}]" + " != 0" * (type_ is bool)
+
+    called = STORE[result].format(f"loop({', '.join(map(expression, given))})")
+    made: dict[str, Any] = {"loop": loop, "carray": carray, "np": np, "Connectivity": Connectivity}
     exec(f"def entry(p, n, x):\n    {called}", made)
     entry = cfunc(ENTRY, nopython=True, error_model="numpy")(made["entry"])
     to.write_bytes(_object(entry.inspect_llvm(), entry.native_name, to.stem))
-    return f"{module}.{name}", parameters, result
+    return f"{module}.{name}", "".join(parameters), result
 
 
-def _result(loop: Any, given: tuple[Any, ...]) -> types.Type:
-    """Compile a loop for arguments of some types; return what it returns."""
-    numbers = {bool: types.boolean, int: types.int64, float: types.float64}
-    loop.compile(
-        tuple(
-            types.Array(from_dtype(np.dtype(t.dtype)), t.axes, "C")
-            if isinstance(t, ArrayType)
-            else numbers[t]
-            for t in given
-        )
-    )
-    (compiled,) = loop.nopython_signatures[-1:]
-    return compiled.return_type
+def _type(given: Any) -> types.Type:
+    """Return numba's type of a parameter's."""
+    if given is Connectivity:
+        return types.NamedTuple(tuple(map(_type, FIELDS)), Connectivity)
+    if isinstance(given, ArrayType):
+        return types.Array(from_dtype(np.dtype(given.dtype)), given.axes, "C")
+    return {bool: types.boolean, int: types.int64, float: types.float64}[given]
 
 
 def _object(ir: str, wrapper: str, name: str) -> bytes:

@@ -1,30 +1,12 @@
-"""The triangles of a split: the fold guard's test, normals, turns across edges."""
+"""The faces that a split makes: the fold guard's test, normals, turns between them."""
 
 from __future__ import annotations
 
 import math
 
-from pns_common.kernels import (
-    b1_1d,
-    f8_1d,
-    f8_2d,
-    i1_1d,
-    i4_2d,
-    i8_1d,
-    inlined,
-    kernel,
-    u4_1d,
-    u4_2d,
-)
-from pns_common.kernels.connectivity import INTERIOR, triangle_of
-from pns_common.kernels.vectors import (
-    NO_AREA,
-    area_vector,
-    difference,
-    dot,
-    normal_and_area,
-    row,
-)
+from pns_common.kernels import Connectivity, b1_1d, f8_1d, f8_2d, inlined, kernel, u4_2d
+from pns_common.kernels.connectivity import INTERIOR, following_corner, triangle_of
+from pns_common.kernels.vectors import NO_AREA, area_vector, difference, dot, row
 
 # A child that keeps less than this share of its area counts as folded.
 LEAST_AREA = 1e-3
@@ -35,23 +17,9 @@ NORMAL_NUMBERS = 1e-300
 
 
 @inlined
-def child_corners(faces, face_edges, vertex_count, f, i):
-    """Return the corners of triangle f's child at corner i; of the middle one for i = 3."""
-    ab, bc = vertex_count + face_edges[f, 0], vertex_count + face_edges[f, 1]
-    ca = vertex_count + face_edges[f, 2]
-    if i == 0:
-        return faces[f, 0], ab, ca
-    if i == 1:
-        return faces[f, 1], bc, ab
-    if i == 2:
-        return faces[f, 2], ca, bc
-    return ab, bc, ca
-
-
-@inlined
-def moved(loop, displacement, scale, v):
-    """Return where Loop puts vertex v, and where it is moved to."""
-    p, s = row(loop, v), scale[v]
+def _moved(base, displacement, scale, v):
+    """Return where the base scheme puts vertex v, and where it is moved to."""
+    p, s = row(base, v), scale[v]
     return p, (
         p[0] + s * displacement[v, 0],
         p[1] + s * displacement[v, 1],
@@ -61,10 +29,10 @@ def moved(loop, displacement, scale, v):
 
 @inlined
 def _folds(p, q, r, cosine):
-    """Return whether a child turned by more than arccos(cosine), or lost its area.
+    """Return whether a triangle turned by more than arccos(cosine), or lost its area.
 
-    Each corner is a pair: where Loop puts it, and where it is moved to. False for a child without
-    area before.
+    Each corner is a pair: where the base scheme puts it, and where it is moved to. False for a
+    triangle without area before.
     """
     old, new = area_vector(p[0], q[0], r[0]), area_vector(p[1], q[1], r[1])
     old_square, new_square, inner = dot(old, old), dot(new, new), dot(old, new)
@@ -81,153 +49,101 @@ def _folds(p, q, r, cosine):
     return not kept_area or not inner >= cosine * size
 
 
-@inlined
-def mark_fold(p, q, r, u, v, w, scale, shared, cosine, to):
-    """Mark the corners u, v, w of a child if it folds, where s is not 0 yet."""
-    if not _folds(p, q, r, cosine):
-        return
-    by_itself = True
-    if len(shared):
-        by_itself = _folds(
-            p if shared[u] else (p[0], p[0]),
-            q if shared[v] else (q[0], q[0]),
-            r if shared[w] else (r[0], r[0]),
-            cosine,
-        )
-    for corner in (u, v, w):
-        if scale[corner] > 0 and (by_itself or not shared[corner]):
-            to[corner] = True
-
-
 @kernel
 def mark_folds(
-    loop: f8_2d,
+    begin: int,
+    end: int,
+    faces: u4_2d,
+    base: f8_2d,
     displacement: f8_2d,
     scale: f8_1d,
     shared: b1_1d,
     changed: b1_1d,
     cosine: float,
-    faces: u4_2d,
-    face_edges: u4_2d,
-    vertex_count: int,
-    begin: int,
-    end: int,
     to: b1_1d,
 ):
-    """Mark the corners of folded children of triangles begin … end − 1 whose s is not 0 yet.
+    """Mark the corners of folded children begin … end − 1 whose s is not 0 yet.
+
+    Of a quad the triangles of each corner and its neighbours are tested.
 
     Args:
-        loop, displacement, scale: Loop's points, δ, s of each new vertex.
+        faces: (C, 3) triangles or (C, 4) quads.
+        base, displacement, scale: the base scheme's points, δ, s of each new vertex.
         shared: flags of vertices of boundaries, which are marked only if they fold a child while
             all others stay; (0,) for none.
         changed: flags of vertices whose s changed in the last round; other children are as they
             were. (0,): all are tested.
         to: flags, False on entry; threads may write the same True at once.
     """
+    degree = faces.shape[1]
     for f in range(max(begin, 0), end):
-        for i in range(4):
-            u, v, w = child_corners(faces, face_edges, vertex_count, f, i)
-            if len(changed) and not (changed[u] or changed[v] or changed[w]):
+        if len(changed):
+            touched = False
+            for i in range(degree):
+                touched = touched or changed[faces[f, i]]
+            if not touched:
                 continue
-            p, q = moved(loop, displacement, scale, u), moved(loop, displacement, scale, v)
-            mark_fold(p, q, moved(loop, displacement, scale, w), u, v, w, scale, shared, cosine, to)
-
-
-@kernel
-def child_normals(
-    points: f8_2d,
-    faces: u4_2d,
-    face_edges: u4_2d,
-    vertex_count: int,
-    begin: int,
-    end: int,
-    normals: f8_2d,
-):
-    """Write the unit normals of the children 4 f … 4 f + 3 of triangles begin … end − 1."""
-    for f in range(max(begin, 0), end):
-        for i in range(4):
-            a, b, c = child_corners(faces, face_edges, vertex_count, f, i)
-            normal, _, _ = normal_and_area(row(points, a), row(points, b), row(points, c))
-            for k in range(3):
-                normals[4 * f + i, k] = normal[k]
+        u, v = faces[f, 0], faces[f, 1]
+        p, q = _moved(base, displacement, scale, u), _moved(base, displacement, scale, v)
+        for i in range(degree if degree > 3 else 1):
+            w = faces[f, i + 2 if i + 2 < degree else i + 2 - degree]
+            r = _moved(base, displacement, scale, w)
+            if _folds(p, q, r, cosine):
+                by_itself = True
+                if len(shared):
+                    by_itself = _folds(
+                        p if shared[u] else (p[0], p[0]),
+                        q if shared[v] else (q[0], q[0]),
+                        r if shared[w] else (r[0], r[0]),
+                        cosine,
+                    )
+                for corner in (u, v, w):
+                    if scale[corner] > 0 and (by_itself or not shared[corner]):
+                        to[corner] = True
+            u, v, p, q = v, w, q, r
 
 
 @inlined
-def squared_chord(normals, f, g):
+def _squared_chord(normals, f, g):
     """Return the squared distance between two unit normals; 0 where one is undefined."""
     n, m = row(normals, f), row(normals, g)
     chord = difference(n, m)
     return dot(chord, chord) if dot(n, n) > 0 and dot(m, m) > 0 else 0.0
 
 
-@inlined
-def _following(h):
-    """Return the child at the corner where half-edge h ends."""
-    f = triangle_of(h)
-    i = h - 3 * f
-    return 4 * f + (i + 1 if i < 2 else 0)
-
-
-@inlined
-def _starting(h):
-    """Return the child at the corner where half-edge h starts."""
-    f = triangle_of(h)
-    return 4 * f + h - 3 * f
-
-
 @kernel
-def largest_chord_inside(normals: f8_2d, begin: int, end: int):
-    """Return the largest squared chord between a middle child and its neighbours."""
+def largest_chord_inside(begin: int, end: int, mesh: Connectivity, quads: bool, normals: f8_2d):
+    """Return the largest squared chord between neighbours among the children of some faces.
+
+    ``quads``: whether corners become quads, which are in a ring; else three triangles are around a
+    fourth.
+    """
     largest = 0.0
     for f in range(max(begin, 0), end):
-        for i in range(3):
-            largest = max(largest, squared_chord(normals, 4 * f + 3, 4 * f + i))
+        first, stop = mesh.offsets[f], mesh.offsets[f + 1]
+        for h in range(first, stop):
+            if quads:
+                chord = _squared_chord(normals, h - 1 if h > first else stop - 1, h)
+            else:
+                chord = _squared_chord(normals, 4 * f + 3, h + f)
+            largest = max(largest, chord)
     return largest
 
 
+@inlined
+def _child_of(h, quads):
+    """Return the child at a corner."""
+    return h if quads else h + triangle_of(h)
+
+
 @kernel
-def largest_chord_across(
-    normals: f8_2d, half_edges: i4_2d, edge_class: i1_1d, begin: int, end: int
-):
+def largest_chord_across(begin: int, end: int, mesh: Connectivity, quads: bool, normals: f8_2d):
     """Return the largest squared chord across the halves of interior edges begin … end − 1."""
     largest = 0.0
     for e in range(max(begin, 0), end):
-        if edge_class[e] == INTERIOR:
-            there, back = half_edges[e, 0], half_edges[e, 1]
-            largest = max(largest, squared_chord(normals, _starting(there), _following(back)))
-            largest = max(largest, squared_chord(normals, _following(there), _starting(back)))
+        if mesh.edge_class[e] == INTERIOR:
+            there, back = mesh.half_edges[e, 0], mesh.half_edges[e, 1]
+            for h, g in ((there, back), (back, there)):
+                other = _child_of(following_corner(mesh, g), quads)
+                largest = max(largest, _squared_chord(normals, _child_of(h, quads), other))
     return largest
-
-
-@kernel
-def opposed_normals(normals: f8_2d, others: f8_2d, begin: int, end: int):
-    """Count the rows whose normals oppose each other."""
-    count = 0
-    for f in range(max(begin, 0), end):
-        count += dot(row(normals, f), row(others, f)) < 0
-    return count
-
-
-@kernel
-def referenced_sum(points: f8_2d, corners: i8_1d | u4_1d, used: b1_1d, total: f8_1d):
-    """Mark the referenced vertices in ``used``; return their number, write their sum."""
-    for h in range(corners.shape[0]):
-        used[corners[h]] = True
-    count = 0
-    for v in range(points.shape[0]):
-        if used[v]:
-            count += 1
-            for k in range(3):
-                total[k] += points[v, k]
-    return count
-
-
-@kernel
-def farthest(points: f8_2d, used: b1_1d, centre: f8_1d):
-    """Return the largest distance of a marked vertex from ``centre``."""
-    largest = 0.0
-    for v in range(points.shape[0]):
-        if used[v]:
-            away = difference(row(points, v), (centre[0], centre[1], centre[2]))
-            largest = max(largest, dot(away, away))
-    return math.sqrt(largest)

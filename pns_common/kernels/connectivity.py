@@ -1,4 +1,4 @@
-"""Edges of a face list, fans around vertices, and the edges of a split mesh by arithmetic.
+"""Edges of a face list, their classes, and steps from corner to corner.
 
 Half-edge h starts at corner h; in triangle meshes corner i of face f is 3 f + i. Edges are numbered
 by first appearance over faces.
@@ -14,11 +14,9 @@ from pns_common.kernels import (
     i4_1d,
     i4_2d,
     i8_1d,
-    i8_2d,
     inlined,
     kernel,
     u4_1d,
-    u4_2d,
 )
 
 INTERIOR, BOUNDARY, IRREGULAR, CREASE = 0, 1, 2, 3
@@ -31,15 +29,14 @@ SKIPPED_ROWS = 1024
 
 
 @inlined
-def skipped_block(rows, reach, block, begin, end):
-    """Return a block's first row and its number of rows; 0 rows if none is in begin … end − 1.
+def rows_of_block(reach, block, each, count, begin, end):
+    """Return where a block of ``each`` rows begins and ends; empty if no vertex is in begin … end.
 
-    ``reach`` has the smallest and the largest vertex of each block.
+    ``reach`` has the smallest and the largest vertex of each block of ``count`` rows.
     """
-    first = max(SKIPPED_ROWS * block, 0)
-    last = min(first + SKIPPED_ROWS, rows.shape[0])
-    inside = reach[block, 1] >= begin and reach[block, 0] < end
-    return first, last - first if inside else 0
+    first = max(each * block, 0)
+    stop = min(first + each, count)
+    return first, stop if reach[block, 1] >= begin and reach[block, 0] < end else first
 
 
 # Columns of a link: the edge's higher vertex, the next link of the chain, its half-edges.
@@ -108,14 +105,6 @@ def number_edges(
     return count
 
 
-@kernel
-def read_links(low: u4_1d, links: i4_2d, begin: int, end: int, edges: u4_2d, half_edges: i4_2d):
-    """Write ends and half-edges of edges begin … end − 1, as ``number_edges`` links them."""
-    for e in range(max(begin, 0), end):
-        edges[e, 0], edges[e, 1] = low[e], links[e, HIGH]
-        half_edges[e, 0], half_edges[e, 1] = links[e, FIRST], links[e, SECOND]
-
-
 @inlined
 def _may_have_twin(corner_edges, links, f):
     """Return whether an earlier triangle may have the edges of triangle f; True if not known."""
@@ -151,12 +140,12 @@ def mark_repeats(corners: u4_1d, offsets: i4_1d, last_face: i4_1d, repeats: b1_1
 
 @kernel
 def classify_edges(
+    begin: int,
+    end: int,
     corners: u4_1d,
     face_of_corner: u4_1d,
     repeats: b1_1d,
     half_edges: i4_2d,
-    begin: int,
-    end: int,
     edge_class: i1_1d,
 ):
     """Write the classes of edges begin … end − 1.
@@ -183,18 +172,10 @@ def classify_edges(
 def _in_repeating_face(face_of_corner, repeats, h):
     if len(repeats) == 0:
         return False
-    return repeats[face_of(h, face_of_corner)]
+    return repeats[face_of_corner[h] if len(face_of_corner) else triangle_of(h)]
 
 
-@kernel
-def count_ends(edges: u4_2d, rows: i8_1d | u4_1d, counts: i4_1d):
-    """Count how many of the edges ``rows`` end at each vertex; ``counts`` (V,) is 0 on entry."""
-    for e in rows:
-        counts[edges[e, 0]] += 1
-        counts[edges[e, 1]] += 1
-
-
-# --- fans -----------------------------------------------------------------------------------------
+# --- steps ----------------------------------------------------------------------------------------
 
 
 @inlined
@@ -224,243 +205,37 @@ def opposite(corners, h):
 
 
 @inlined
-def face_corners(h, offsets, face_of_corner):
-    """Return the first corner of a corner's face, and the first after them."""
-    if len(face_of_corner) == 0:
-        first = 3 * triangle_of(h)
-        return first, first + 3
-    f = face_of_corner[h]
-    return offsets[f], offsets[f + 1]
-
-
-@inlined
-def face_of(h, face_of_corner):
+def face_of(mesh, h):
     """Return the face of a corner."""
-    return face_of_corner[h] if len(face_of_corner) else triangle_of(h)
+    return mesh.face_of_corner[h] if len(mesh.face_of_corner) else triangle_of(h)
 
 
 @inlined
-def following_corner(h, offsets, face_of_corner):
+def following_corner(mesh, h):
     """Return the next corner of a face of any degree."""
-    first, stop = face_corners(h, offsets, face_of_corner)
-    return h + 1 if h + 1 < stop else first
+    if len(mesh.face_of_corner) == 0:
+        return next_corner(h)
+    f = mesh.face_of_corner[h]
+    return h + 1 if h + 1 < mesh.offsets[f + 1] else mesh.offsets[f]
 
 
 @inlined
-def preceding_corner(h, offsets, face_of_corner):
+def preceding_corner(mesh, h):
     """Return the previous corner of a face of any degree."""
-    first, stop = face_corners(h, offsets, face_of_corner)
-    return h - 1 if h > first else stop - 1
+    if len(mesh.face_of_corner) == 0:
+        return previous_corner(h)
+    f = mesh.face_of_corner[h]
+    return h - 1 if h > mesh.offsets[f] else mesh.offsets[f + 1] - 1
 
 
 @inlined
-def twin(corner_edges, half_edges, edge_class, h):
-    """Return the other half-edge of an interior or crease edge; −1 at other edges."""
-    e = corner_edges[h]
-    if edge_class[e] == BOUNDARY or edge_class[e] == IRREGULAR:
+def opposed(mesh, h):
+    """Return the other half-edge of an interior edge; −1 at other edges."""
+    e = mesh.corner_edges[h]
+    if mesh.edge_class[e] != INTERIOR:
         return -1
-    first = half_edges[e, 0]
-    return half_edges[e, 1] if first == h else first
-
-
-@kernel
-def count_corners(corners: u4_1d, reach: i8_2d, begin: int, end: int, corner: i4_1d, count: i4_1d):
-    """Write the last corner at each vertex begin … end − 1, and how many there are.
-
-    ``reach`` is that of blocks of 3 × SKIPPED_ROWS corners.
-    """
-    for v in range(max(begin, 0), end):
-        count[v] = 0
-    for block in range(reach.shape[0]):
-        if reach[block, 1] < begin or reach[block, 0] >= end:
-            continue
-        first = 3 * SKIPPED_ROWS * block
-        for h in range(first, min(first + 3 * SKIPPED_ROWS, corners.shape[0])):
-            v = corners[h]
-            if begin <= v < end:
-                corner[v] = h
-                count[v] += 1
-
-
-@kernel
-def count_fans(
-    offsets: i4_1d,
-    face_of_corner: u4_1d,
-    corner_edges: u4_1d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-    corner: i4_1d,
-    count: i4_1d,
-    begin: int,
-    end: int,
-    fans: i1_1d,
-):
-    """Write how many fans the corners of vertices begin … end − 1 form: 0, 1, or 2 for more.
-
-    Creases divide no fan. ``corner`` and ``count`` come from ``count_corners``.
-    """
-    for v in range(max(begin, 0), end):
-        fans[v] = 0
-        if count[v] == 0:
-            continue
-        start = corner[v]
-        seen, h = 1, start
-        while seen <= count[v]:
-            h = twin(corner_edges, half_edges, edge_class, h)
-            if h < 0:
-                break
-            h = following_corner(h, offsets, face_of_corner)
-            if h == start:
-                break
-            seen += 1
-        if h < 0:
-            h = start
-            while seen <= count[v]:
-                before = preceding_corner(h, offsets, face_of_corner)
-                h = twin(corner_edges, half_edges, edge_class, before)
-                if h < 0:
-                    break
-                seen += 1
-        fans[v] = 1 if seen == count[v] else 2
-
-
-# --- the split of triangles ----------------------------------------------------------------------
-#
-# A parent edge has two children, a parent face three edges inside it. Over the faces (a, ab, ca),
-# (b, bc, ab), (c, ca, bc), (ab, bc, ca) of a parent they appear in this order, the children of an
-# edge only in the first face that it is on:
-#
-#     a–ab  ab–ca  ca–a    b–bc  bc–ab  ab–b    c–ca  ca–bc  bc–c
-#
-# So corner i holds half of the edge that leaves it, the edge that cuts it off, and half of the edge
-# that enters it. This holds where no face names a vertex twice and no two have the same three.
-
-
-@kernel
-def split_faces(
-    faces: u4_2d,
-    face_edges: u4_2d,
-    vertex_count: int,
-    begin: int,
-    end: int,
-    to_faces: i8_2d | u4_2d,
-):
-    """Write the children 4 f … 4 f + 3 of triangles begin … end − 1."""
-    for f in range(max(begin, 0), end):
-        for i in range(3):
-            middle = vertex_count + face_edges[f, i]
-            before = i - 1 if i > 0 else 2
-            to_faces[4 * f + i, 0] = faces[f, i]
-            to_faces[4 * f + i, 1] = middle
-            to_faces[4 * f + i, 2] = vertex_count + face_edges[f, before]
-            to_faces[4 * f + 3, i] = middle
-
-
-@inlined
-def opened_before(half_edges, corner):
-    """Count the edges that first appear before a corner; first half-edges ascend."""
-    least, most = 0, half_edges.shape[0]
-    while least < most:
-        middle = (least + most) // 2
-        if half_edges[middle, 0] < corner:
-            least = middle + 1
-        else:
-            most = middle
-    return least
-
-
-@kernel
-def number_halves(
-    faces: u4_2d,
-    face_edges: u4_2d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    begin: int,
-    end: int,
-    halves: u4_2d,
-):
-    """Assign numbers to both children of the edges that first appear in faces begin … end − 1.
-
-    ``halves`` (E, 2), out: the child at the lower endpoint, and at the higher.
-    """
-    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
-    for f in range(max(begin, 0), end):
-        for i in range(3):
-            before = i - 1 if i > 0 else 2
-            leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
-            if half_edges[leaving, 0] == 3 * f + i:
-                halves[leaving, 0 if vertex == edges[leaving, 0] else 1] = following
-                following += 1
-            following += 1
-            if half_edges[entering, 0] == 3 * f + before:
-                halves[entering, 0 if vertex == edges[entering, 0] else 1] = following
-                following += 1
-
-
-@inlined
-def _half_at(h, faces, vertex):
-    """Return the half of a parent's half-edge that is at ``vertex``."""
-    f = triangle_of(h)
-    i = h - 3 * f
-    if faces[f, i] == vertex:
-        return 12 * f + 3 * i
-    return 12 * f + 3 * (i + 1 if i < 2 else 0) + 2
-
-
-@inlined
-def _write_half(e, vertex, child, faces, vertex_count, half_edges, edge_class, to):
-    """Write a child of parent edge e: as many half-edges as e, of e's class."""
-    to_edges, to_half_edges, to_class = to
-    to_edges[child, 0], to_edges[child, 1] = vertex, vertex_count + e
-    first, second = half_edges[e, 0], half_edges[e, 1]
-    to_half_edges[child, 0] = _half_at(first, faces, vertex)
-    to_half_edges[child, 1] = second if second < 0 else _half_at(second, faces, vertex)
-    to_class[child] = edge_class[e]
-
-
-@kernel
-def split_edges(
-    faces: u4_2d,
-    face_edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-    halves: u4_2d,
-    vertex_count: int,
-    begin: int,
-    end: int,
-    to_face_edges: u4_2d,
-    to_edges: u4_2d,
-    to_half_edges: i4_2d,
-    to_class: i1_1d,
-):
-    """Write the edges of the children of triangles begin … end − 1."""
-    to = to_edges, to_half_edges, to_class
-    following = 3 * begin + 2 * opened_before(half_edges, 3 * begin)
-    for f in range(max(begin, 0), end):
-        for i in range(3):
-            before, after = i - 1 if i > 0 else 2, i + 1 if i < 2 else 0
-            leaving, entering, vertex = face_edges[f, i], face_edges[f, before], faces[f, i]
-            out_of = halves[leaving, 0 if vertex < faces[f, after] else 1]
-            into = halves[entering, 0 if vertex < faces[f, before] else 1]
-            if half_edges[leaving, 0] == 3 * f + i:
-                _write_half(
-                    leaving, vertex, out_of, faces, vertex_count, half_edges, edge_class, to
-                )
-                following += 1
-            inner = following
-            following += 1
-            if half_edges[entering, 0] == 3 * f + before:
-                _write_half(entering, vertex, into, faces, vertex_count, half_edges, edge_class, to)
-                following += 1
-            source, target = vertex_count + leaving, vertex_count + entering
-            to_edges[inner, 0], to_edges[inner, 1] = min(source, target), max(source, target)
-            to_half_edges[inner, 0] = 12 * f + 3 * i + 1
-            to_half_edges[inner, 1] = 12 * f + 9 + before
-            to_class[inner] = INTERIOR
-            to_face_edges[4 * f + i, 0] = out_of
-            to_face_edges[4 * f + i, 1] = inner
-            to_face_edges[4 * f + i, 2] = into
-            to_face_edges[4 * f + 3, before] = inner
+    first = mesh.half_edges[e, 0]
+    return mesh.half_edges[e, 1] if first == h else first
 
 
 @kernel

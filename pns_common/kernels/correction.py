@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import b1_1d, f8_1d, f8_2d, i1_1d, i8_1d, inlined, kernel, u4_1d, u4_2d
+from pns_common.kernels import Connectivity, b1_1d, f8_1d, f8_2d, i8_1d, inlined, kernel, u4_1d
 from pns_common.kernels.connectivity import INTERIOR
 from pns_common.kernels.vectors import dot, norm, over, row
 
@@ -61,8 +61,6 @@ def _write(at, delta, gate, bound, displacement, ratio, gates, bounds):
 def correct_by_equation_1(
     rows: u4_1d,
     first: int,
-    begin: int,
-    end: int,
     eta: f8_2d,
     frames: f8_2d,
     gate: f8_1d,
@@ -72,35 +70,31 @@ def correct_by_equation_1(
     gates: f8_1d,
     bounds: f8_1d,
 ):
-    """Write δ = h² γ F η (C / R), ‖η‖ ≤ 1, at rows[begin:end] of the output, from ``first`` on.
+    """Write δ = h² γ F η (C / R), ‖η‖ ≤ 1, at ``rows`` of the output, from ``first`` on.
 
-    Row 0 of ``eta``, ``frames``, ``gate`` and ``bound`` (C h² / R) is that of rows[begin].
+    ``eta``, ``frames``, ``gate`` and ``bound`` (C h² / R) have a row for each of them.
     """
-    for i in range(max(begin, 0), end):
-        here = i - begin
-        turned = combined(in_ball(row(eta, here)), frames, here)
-        size = bound[here] * gate[here]
+    for i in range(rows.shape[0]):
+        turned = combined(in_ball(row(eta, i)), frames, i)
+        size = bound[i] * gate[i]
         delta = size * turned[0], size * turned[1], size * turned[2]
-        at = first + rows[i]
-        _write(at, delta, gate[here], bound[here], displacement, ratio, gates, bounds)
+        _write(first + rows[i], delta, gate[i], bound[i], displacement, ratio, gates, bounds)
 
 
 @kernel
-def place_flat(
-    points: f8_2d,
-    edges: u4_2d,
-    edge_class: i1_1d,
-    ringed: b1_1d,
-    base: f8_2d,
-    flat: f8_2d,
-):
+def place_flat(points: f8_2d, mesh: Connectivity, ringed: b1_1d, base: f8_2d, flat: f8_2d):
     """Write D of vertices and of edges, from x0 = ``base`` to flat; 0 where no network acts."""
     count = points.shape[0]
     for v in range(count):
         for k in range(3):
             flat[v, k] = points[v, k] - base[v, k] if ringed[v] else 0.0
-    for e in range(edges.shape[0]):
-        a, b, to, acts = edges[e, 0], edges[e, 1], count + e, edge_class[e] == INTERIOR
+    for e in range(mesh.edges.shape[0]):
+        a, b, to, acts = (
+            mesh.edges[e, 0],
+            mesh.edges[e, 1],
+            count + e,
+            mesh.edge_class[e] == INTERIOR,
+        )
         for k in range(3):
             middle = (points[a, k] + points[b, k]) / 2
             flat[to, k] = middle - base[to, k] if acts else 0.0
@@ -108,10 +102,10 @@ def place_flat(
 
 @kernel
 def correct_from_flat(
-    rows: u4_1d,
-    first: int,
     begin: int,
     end: int,
+    rows: u4_1d,
+    first: int,
     asked: f8_2d,
     reach: f8_1d,
     gate: f8_1d,

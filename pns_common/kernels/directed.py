@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import (
+    Connectivity,
     b1_1d,
     f4_2d,
     f8_1d,
     f8_2d,
-    i1_1d,
     i4_1d,
-    i4_2d,
     i8_1d,
     inlined,
     kernel,
@@ -24,7 +23,6 @@ from pns_common.kernels import (
     u4_2d,
 )
 from pns_common.kernels.connectivity import INTERIOR, IRREGULAR, face_of, opposite
-from pns_common.kernels.frames import wing
 from pns_common.kernels.measures import LENGTH
 from pns_common.kernels.vectors import across, cross, difference, divisor, dot, norm, over, row
 
@@ -40,14 +38,14 @@ NO_LOG = -1e300
 
 
 @inlined
-def sides_of(e, corners, edges, half_edges, edge_class):
+def _sides_of(mesh, e):
     """Return the half-edges of e in the faces left and right of a → b; −1 for none."""
     left, right = -1, -1
-    if edge_class[e] != IRREGULAR:
+    if mesh.edge_class[e] != IRREGULAR:
         for side in range(2):
-            h = half_edges[e, side]
+            h = mesh.half_edges[e, side]
             if h >= 0:
-                if corners[h] == edges[e, 0]:
+                if mesh.corners[h] == mesh.edges[e, 0]:
                     left = h
                 else:
                     right = h
@@ -55,28 +53,26 @@ def sides_of(e, corners, edges, half_edges, edge_class):
 
 
 @inlined
-def normal_of(normals, h, face_of_corner):
+def _normal_of(normals, mesh, h):
     """Return the unit normal of the face of a half-edge; 0 without one."""
-    if h < 0:
-        return 0.0, 0.0, 0.0
-    return row(normals, face_of(h, face_of_corner))
+    return row(normals, face_of(mesh, h)) if h >= 0 else (0.0, 0.0, 0.0)
 
 
 @inlined
-def sum_of(u, v):
+def _sum_of(u, v):
     """Return u + v."""
     return u[0] + v[0], u[1] + v[1], u[2] + v[2]
 
 
 @inlined
-def directed_frame(a, b, n, m, at_a, at_b):
+def _directed_frame(a, b, n, m, at_a, at_b):
     """Return T, N, B and h of a → b; n, m are the faces' normals, at_a and at_b the ends'."""
     spoke = difference(b, a)
     h = norm(spoke)
     t = over(spoke, divisor(spoke))
-    up = across(sum_of(n, m), t)
+    up = across(_sum_of(n, m), t)
     if norm(up) <= NO_MEAN:
-        up = across(sum_of(at_a, at_b), t)
+        up = across(_sum_of(at_a, at_b), t)
         if norm(up) <= NO_MEAN:
             up = 0.0, 0.0, 0.0
     up = over(up, divisor(up))
@@ -104,30 +100,35 @@ def _write_turned(features, to, column, v, s):
 
 
 @inlined
-def _opposite(points, h, corners, offsets, face_of_corner):
+def _opposite(points, mesh, h):
     """Return the mean of a face's corners off a half-edge."""
-    if len(face_of_corner):
-        c = wing(points, h, corners, offsets, face_of_corner)
-        return c[0], c[1], c[2]
-    return row(points, opposite(corners, h))
+    if len(mesh.face_of_corner) == 0:
+        return row(points, opposite(mesh.corners, h))
+    f = mesh.face_of_corner[h]
+    first, stop = mesh.offsets[f], mesh.offsets[f + 1]
+    after = h + 1 if h + 1 < stop else first
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(first, stop):
+        if i != h and i != after:
+            v = mesh.corners[i]
+            x += points[v, 0]
+            y += points[v, 1]
+            z += points[v, 2]
+    count = stop - first - 2
+    return x / count, y / count, z / count
 
 
 @kernel
 def directed_features(
+    begin: int,
+    end: int,
     points: f8_2d,
     normals: f8_2d,
     fields: f8_2d,
     means: f8_2d,
     logs: f8_1d,
     sizes: f8_2d,
-    corners: u4_1d,
-    offsets: i4_1d,
-    face_of_corner: u4_1d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-    begin: int,
-    end: int,
+    mesh: Connectivity,
     features: f4_2d | f8_2d,
 ):
     """Write `directed-28` of both ways of edges begin … end − 1.
@@ -139,26 +140,24 @@ def directed_features(
         features: (2 (end − begin), 28) out.
     """
     for e in range(max(begin, 0), end):
-        a, b = edges[e, 0], edges[e, 1]
-        left, right = sides_of(e, corners, edges, half_edges, edge_class)
-        n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
+        a, b = mesh.edges[e, 0], mesh.edges[e, 1]
+        left, right = _sides_of(mesh, e)
+        n, m = _normal_of(normals, mesh, left), _normal_of(normals, mesh, right)
         p, q, at_a, at_b = row(points, a), row(points, b), row(fields, a), row(fields, b)
-        t, up, side, h = directed_frame(p, q, n, m, at_a, at_b)
+        t, up, side, h = _directed_frame(p, q, n, m, at_a, at_b)
         size = h if h > 0 else 1.0
         middle = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2
         c, d = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if left >= 0:
-            to = difference(_opposite(points, left, corners, offsets, face_of_corner), middle)
-            c = _local(to, t, up, side, size)
+            c = _local(difference(_opposite(points, mesh, left), middle), t, up, side, size)
         if right >= 0:
-            to = difference(_opposite(points, right, corners, offsets, face_of_corner), middle)
-            d = _local(to, t, up, side, size)
+            d = _local(difference(_opposite(points, mesh, right), middle), t, up, side, size)
         turn = 0.0
         if left >= 0 and right >= 0 and dot(n, n) > 0 and dot(m, m) > 0:
-            turn = 2 * math.atan2(norm(difference(n, m)), norm(sum_of(n, m)))
+            turn = 2 * math.atan2(norm(difference(n, m)), norm(_sum_of(n, m)))
             if c[1] + d[1] > 0:
                 turn = -turn
-        border = 1.0 if edge_class[e] != INTERIOR else 0.0
+        sharp = 1.0 if mesh.edge_class[e] != INTERIOR else 0.0
         saturated = math.tanh(turn / TURNS[0]), math.tanh(turn / TURNS[1])
         c, d = _soft(c), _soft(d)
         m1, m2 = _local(at_a, t, up, side, 1.0), _local(at_b, t, up, side, 1.0)
@@ -179,7 +178,7 @@ def directed_features(
             _write_turned(features, to, 18, u2 if way == 0 else u1, s)
             _write(features, to, 21, r1 if way == 0 else r2, r2 if way == 0 else r1, sizes[v, 1])
             _write(features, to, 24, sizes[w, 1], sizes[v, 2], sizes[w, 2])
-            features[to, 27] = border
+            features[to, 27] = sharp
 
 
 @inlined
@@ -195,14 +194,9 @@ def _length_ratio(h, log, sizes, v):
 
 @kernel
 def measure_sizes(
-    means: f8_2d,
-    valence: i4_1d,
-    on_border: b1_1d,
-    begin: int,
-    end: int,
-    sizes: f8_2d,
+    begin: int, end: int, means: f8_2d, valence: i4_1d, on_boundary: b1_1d, sizes: f8_2d
 ):
-    """Write logarithms of mean length and of valence / 6, and 1 at borders, of some vertices.
+    """Write logarithms of mean length and of valence / 6, and 1 at boundaries, of some vertices.
 
     The first is NO_LOG where there is no length.
     """
@@ -210,16 +204,16 @@ def measure_sizes(
         mean = means[v, LENGTH]
         sizes[v, 0] = math.log(mean) if mean > 0 else NO_LOG
         sizes[v, 1] = math.log(max(valence[v], 1) / 6.0)
-        sizes[v, 2] = 1.0 if on_border[v] else 0.0
+        sizes[v, 2] = 1.0 if on_boundary[v] else 0.0
 
 
 @kernel
 def pool(
+    begin: int,
+    end: int,
     states: f4_2d | f8_2d,
     starts: i8_1d,
     spokes: u4_1d,
-    begin: int,
-    end: int,
     total: f8_1d,
     pooled: f4_2d | f8_2d,
 ):
@@ -247,11 +241,11 @@ def pool(
 
 @kernel
 def gather(
+    begin: int,
+    end: int,
     states: f4_2d | f8_2d,
     told: f4_2d | f8_2d,
     edges: u4_2d,
-    begin: int,
-    end: int,
     messages: f4_2d | f8_2d,
 ):
     """Write what edges begin … end − 1 hear, both ways.
@@ -276,17 +270,13 @@ def gather(
 
 @kernel
 def read_heads(
+    begin: int,
+    end: int,
     points: f8_2d,
     normals: f8_2d,
     fields: f8_2d,
-    corners: u4_1d,
-    face_of_corner: u4_1d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
+    mesh: Connectivity,
     heads: f8_2d,
-    begin: int,
-    end: int,
     asked: f8_2d,
     leaving: f8_2d,
     logits: f8_1d,
@@ -302,10 +292,10 @@ def read_heads(
     for e in range(max(begin, 0), end):
         i = 2 * (e - begin)
         j = i + 1
-        a, b = edges[e, 0], edges[e, 1]
-        left, right = sides_of(e, corners, edges, half_edges, edge_class)
-        n, m = normal_of(normals, left, face_of_corner), normal_of(normals, right, face_of_corner)
-        t, up, side, _ = directed_frame(
+        a, b = mesh.edges[e, 0], mesh.edges[e, 1]
+        left, right = _sides_of(mesh, e)
+        n, m = _normal_of(normals, mesh, left), _normal_of(normals, mesh, right)
+        t, up, side, _ = _directed_frame(
             row(points, a), row(points, b), n, m, row(fields, a), row(fields, b)
         )
         for k in range(3):
@@ -322,12 +312,12 @@ def read_heads(
 
 @kernel
 def mean_leaving(
+    begin: int,
+    end: int,
     leaving: f8_2d,
     corner_logits: f8_1d,
     starts: i8_1d,
     spokes: u4_1d,
-    begin: int,
-    end: int,
     asked: f8_2d,
     logits: f8_1d,
 ):
@@ -352,32 +342,21 @@ def mean_leaving(
 
 
 @kernel
-def mean_in_faces(
-    heights: f8_1d,
-    offsets: i4_1d,
-    corner_edges: u4_1d,
-    begin: int,
-    end: int,
-    asked: f8_1d,
-):
+def mean_in_faces(begin: int, end: int, heights: f8_1d, mesh: Connectivity, asked: f8_1d):
     """Write the mean of ``heights`` (2 E,) over the edges around faces begin … end − 1.
 
     Both directions count: a mirror puts the face to the left of the other one.
     """
     for f in range(max(begin, 0), end):
-        total = 0.0
-        for h in range(offsets[f], offsets[f + 1]):
-            e = corner_edges[h]
+        first, stop, total = mesh.offsets[f], mesh.offsets[f + 1], 0.0
+        for h in range(first, stop):
+            e = mesh.corner_edges[h]
             total += heights[2 * e] + heights[2 * e + 1]
-        asked[f] = total / (2 * (offsets[f + 1] - offsets[f]))
+        asked[f] = total / (2 * (stop - first))
 
 
 @kernel
-def find_leaving(
-    edges: u4_2d,
-    stops: i8_1d,
-    spokes: u4_1d,
-):
+def find_leaving(edges: u4_2d, stops: i8_1d, spokes: u4_1d):
     """Write the directed edges that leave vertex 0, 1, …, one after another.
 
     Args:
@@ -393,9 +372,7 @@ def find_leaving(
 
 @kernel
 def spread_gates(
-    corners: u4_1d,
-    offsets: i4_1d,
-    corner_edges: u4_1d,
+    mesh: Connectivity,
     of_edges: f8_1d,
     opened: f8_1d,
     at_vertices: f8_1d,
@@ -410,12 +387,12 @@ def spread_gates(
         at_vertices: (V,) the largest around each; in: 0.
         most, least: (E,) of the faces beside each edge; in: 0 and 1.
     """
-    for f in range(offsets.shape[0] - 1):
-        gate = 0.0
-        for h in range(offsets[f], offsets[f + 1]):
-            gate = max(gate, of_edges[corner_edges[h]])
+    for f in range(mesh.offsets.shape[0] - 1):
+        first, stop, gate = mesh.offsets[f], mesh.offsets[f + 1], 0.0
+        for h in range(first, stop):
+            gate = max(gate, of_edges[mesh.corner_edges[h]])
         opened[f] = gate
-        for h in range(offsets[f], offsets[f + 1]):
-            e, v = corner_edges[h], corners[h]
+        for h in range(first, stop):
+            e, v = mesh.corner_edges[h], mesh.corners[h]
             most[e], least[e] = max(most[e], gate), min(least[e], gate)
             at_vertices[v] = max(at_vertices[v], gate)

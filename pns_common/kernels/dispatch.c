@@ -1,6 +1,7 @@
 /* Calls of compiled loops from Python.
 
    A loop is chosen by the dtypes, axes and layout of the arguments; where none suits, TypeError.
+   A tuple stands for what it holds.
    The interpreter's lock is released while a loop runs. ahead.py writes loops.h, the table.
    Stable interface of Python 3.11 and of numpy: one module for all later versions of both. */
 
@@ -123,14 +124,24 @@ static PyObject *no_loop(const Loop *loop, PyObject *const *given, Py_ssize_t co
     return NULL;
 }
 
-static PyObject *call(PyObject *self, PyObject *const *given, Py_ssize_t count)
+static PyObject *call(PyObject *self, PyObject *const *passed, Py_ssize_t passed_count)
 {
     const Loop *first = PyCapsule_GetPointer(self, NULL), *loop = first;
+    PyObject *given[MOST];
+    Py_ssize_t count = 0;
+    for (Py_ssize_t i = 0; i < passed_count; i++) {
+        const int is_tuple = PyTuple_Check(passed[i]);
+        const Py_ssize_t items = is_tuple ? PyTuple_Size(passed[i]) : 1;
+        if (count + items > MOST)
+            return no_loop(first, passed, passed_count);
+        for (Py_ssize_t item = 0; item < items; item++)
+            given[count++] = is_tuple ? PyTuple_GetItem(passed[i], item) : passed[i];
+    }
     Arguments read;
     int suits = 0;
     if (first == NULL)
         return NULL;
-    for (; count <= MOST && loop < LOOPS + COUNT && strcmp(loop->name, first->name) == 0; loop++) {
+    for (; loop < LOOPS + COUNT && strcmp(loop->name, first->name) == 0; loop++) {
         suits = read_arguments(loop->parameters, given, count, &read);
         if (suits < 0)
             return NULL;

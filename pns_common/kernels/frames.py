@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from pns_common.kernels import (
+    Connectivity,
     b1_1d,
     f4_2d,
     f8_1d,
     f8_2d,
-    i4_2d,
     i8_1d,
     inlined,
     kernel,
     u4_1d,
-    u4_2d,
 )
 from pns_common.kernels.connectivity import next_corner, previous_corner, triangle_of
 from pns_common.kernels.measures import HEIGHT
-from pns_common.kernels.vectors import (
-    across,
-    between,
-    cross,
-    divisor,
-    dot,
-    over,
-    row,
-)
+from pns_common.kernels.vectors import across, between, cross, divisor, dot, over, row
 
 # Faces are antiparallel where n1 · n2 ≤ −1 + ANTIPARALLEL (the paper's ε).
 ANTIPARALLEL = 1e-6
@@ -60,13 +51,8 @@ def frames_and_features(
     fields: f8_2d,
     lengths: f8_1d,
     logs: f8_1d,
-    corners: u4_1d,
-    edges: u4_2d,
-    corner_edges: u4_1d,
-    half_edges: i4_2d,
+    mesh: Connectivity,
     rows: u4_1d,
-    begin: int,
-    end: int,
     symmetric: bool,
     starts: i8_1d,
     frames: f8_2d,
@@ -75,9 +61,10 @@ def frames_and_features(
     degenerate: b1_1d,
     features: f4_2d | f8_2d,
 ):
-    """Write frames and features of the interior edges rows[begin:end]; row 0 is the first of them.
+    """Write frames and features of N interior edges of triangles.
 
     Args:
+        rows: (N,) their numbers.
         fields: (V, 4) mean normals and umbrella heights; (0, 4) where no group reads rings.
         lengths, logs: (E,) lengths and their logarithms.
         symmetric: whether c lies to the left of a → b and degenerate edges have x = 0. Otherwise c
@@ -89,10 +76,11 @@ def frames_and_features(
         degenerate: (N,) out: whether the frame is the fallback.
         features: (N, K) out.
     """
-    for i in range(begin, end):
-        e, to = rows[i], i - begin
-        a, b = edges[e, 0], edges[e, 1]
-        h1, h2 = half_edges[e, 0], half_edges[e, 1]
+    corners, corner_edges = mesh.corners, mesh.corner_edges
+    for i in range(rows.shape[0]):
+        e = rows[i]
+        a, b = mesh.edges[e, 0], mesh.edges[e, 1]
+        h1, h2 = mesh.half_edges[e, 0], mesh.half_edges[e, 1]
         forwards = corners[h1] == a
         if symmetric and not forwards:
             h1, h2, forwards = h2, h1, True
@@ -108,20 +96,12 @@ def frames_and_features(
         if symmetric and fallback:
             x = 0.0
         for k in range(3):
-            frames[to, k], frames[to, 3 + k], frames[to, 6 + k] = t[k], up[k], side[k]
-        curvature[to], length[to], degenerate[to] = x, lengths[e], fallback
+            frames[i, k], frames[i, 3 + k], frames[i, 6 + k] = t[k], up[k], side[k]
+        curvature[i], length[i], degenerate[i] = x, lengths[e], fallback
         at = logs[ac], logs[bc], logs[ad], logs[bd]
-        _write_two_faces(features, to, starts, x, at, logs[e], dot(cross(n, m), t))
+        _write_two_faces(features, i, starts, x, at, logs[e], dot(cross(n, m), t))
         if len(fields):
-            at_a, at_b = four(fields, a), four(fields, b)
-            at_c, at_d = four(fields, c), four(fields, d)
-            _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d)
-
-
-@inlined
-def four(values, i):
-    """Return the first four columns of a row."""
-    return values[i, 0], values[i, 1], values[i, 2], values[i, 3]
+            _write_rings(features, i, starts, t, side, fields, a, b, c, d)
 
 
 @inlined
@@ -140,38 +120,15 @@ def _write_two_faces(features, to, starts, x, logs, log, dihedral):
 
 
 @inlined
-def _write_rings(features, to, starts, t, side, at_a, at_b, at_c, at_d):
-    """Write the groups that see rings: ``at_a`` … ``at_d``, mean normals and umbrella heights."""
-    k = starts[ENDS]
-    if k >= 0:
-        features[to, k], features[to, k + 1] = dot(at_a, t), dot(at_b, t)
-        features[to, k + 2], features[to, k + 3] = dot(at_a, side), dot(at_b, side)
-    k = starts[WINGS]
-    if k >= 0:
-        features[to, k], features[to, k + 1] = dot(at_c, t), dot(at_d, t)
-        features[to, k + 2], features[to, k + 3] = dot(at_c, side), dot(at_d, side)
+def _write_rings(features, to, starts, t, side, fields, a, b, c, d):
+    """Write the groups that see rings: mean normals and umbrella heights."""
+    for group, v, w in ((ENDS, a, b), (WINGS, c, d)):
+        k = starts[group]
+        if k >= 0:
+            n, m = row(fields, v), row(fields, w)
+            features[to, k], features[to, k + 1] = dot(n, t), dot(m, t)
+            features[to, k + 2], features[to, k + 3] = dot(n, side), dot(m, side)
     k = starts[UMBRELLA]
     if k >= 0:
-        features[to, k], features[to, k + 1] = at_a[HEIGHT], at_b[HEIGHT]
-        features[to, k + 2], features[to, k + 3] = at_c[HEIGHT], at_d[HEIGHT]
-
-
-@inlined
-def wing(values, h, corners, offsets, face_of_corner):
-    """Return the mean of the first four columns over a face's corners other than an edge's ends.
-
-    The edge leaves corner h. Of three columns the last one returned is 0.
-    """
-    f = face_of_corner[h]
-    first, stop = offsets[f], offsets[f + 1]
-    after, width = h + 1 if h + 1 < stop else first, values.shape[1]
-    x, y, z, w = 0.0, 0.0, 0.0, 0.0
-    for i in range(first, stop):
-        if i != h and i != after:
-            v = corners[i]
-            x += values[v, 0]
-            y += values[v, 1]
-            z += values[v, 2]
-            w += values[v, 3] if width > HEIGHT else 0.0
-    count = stop - first - 2
-    return x / count, y / count, z / count, w / count
+        features[to, k], features[to, k + 1] = fields[a, HEIGHT], fields[b, HEIGHT]
+        features[to, k + 2], features[to, k + 3] = fields[c, HEIGHT], fields[d, HEIGHT]

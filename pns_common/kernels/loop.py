@@ -6,22 +6,19 @@ reads all edges.
 
 from __future__ import annotations
 
-import math
-
 from pns_common.kernels import (
+    Connectivity,
     f8_1d,
     f8_2d,
     i1_1d,
     i4_1d,
-    i4_2d,
     i8_1d,
     i8_2d,
     inlined,
     kernel,
-    u4_1d,
     u4_2d,
 )
-from pns_common.kernels.connectivity import INTERIOR, opposite, skipped_block
+from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, opposite, rows_of_block
 
 EDGE_ENDPOINT, EDGE_OPPOSITE = 3 / 8, 1 / 8
 MIDPOINT = 1 / 2
@@ -30,15 +27,7 @@ CURVE_CENTRE, CURVE_NEIGHBOUR = 3 / 4, 1 / 8
 
 @kernel
 def place_edges(
-    points: f8_2d,
-    corners: u4_1d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-    soft: f8_1d,
-    begin: int,
-    end: int,
-    placed: f8_2d,
+    begin: int, end: int, points: f8_2d, mesh: Connectivity, soft: f8_1d, placed: f8_2d
 ):
     """Write the vertices of edges begin … end − 1: Loop's if interior, else the midpoint.
 
@@ -46,9 +35,10 @@ def place_edges(
     edge is soft.
     """
     for e in range(max(begin, 0), end):
-        a, b = edges[e, 0], edges[e, 1]
-        if edge_class[e] == INTERIOR:
-            c, d = opposite(corners, half_edges[e, 0]), opposite(corners, half_edges[e, 1])
+        a, b = mesh.edges[e, 0], mesh.edges[e, 1]
+        if mesh.edge_class[e] == INTERIOR:
+            c = opposite(mesh.corners, mesh.half_edges[e, 0])
+            d = opposite(mesh.corners, mesh.half_edges[e, 1])
             for k in range(3):
                 ends, sides = points[a, k] + points[b, k], points[c, k] + points[d, k]
                 placed[e, k] = EDGE_ENDPOINT * ends + EDGE_OPPOSITE * sides
@@ -63,7 +53,7 @@ def place_edges(
 
 @kernel
 def sum_rings(
-    points: f8_2d, edges: u4_2d, reach: i8_2d, begin: int, end: int, sums: f8_2d, valence: i4_1d
+    begin: int, end: int, points: f8_2d, edges: u4_2d, reach: i8_2d, sums: f8_2d, valence: i4_1d
 ):
     """Write the sums of neighbours, and the valences, of vertices begin … end − 1."""
     for v in range(max(begin, 0), end):
@@ -71,8 +61,8 @@ def sum_rings(
         for k in range(3):
             sums[v, k] = 0.0
     for block in range(reach.shape[0]):
-        first, count = skipped_block(edges, reach, block, begin, end)
-        for e in range(first, first + count):
+        first, stop = rows_of_block(reach, block, SKIPPED_ROWS, edges.shape[0], begin, end)
+        for e in range(first, stop):
             a, b = edges[e, 0], edges[e, 1]
             if begin <= a < end:
                 valence[a] += 1
@@ -85,7 +75,7 @@ def sum_rings(
 
 
 @kernel
-def blend_rings(points: f8_2d, valence: i4_1d, beta: f8_1d, begin: int, end: int, sums: f8_2d):
+def blend_rings(begin: int, end: int, points: f8_2d, valence: i4_1d, beta: f8_1d, sums: f8_2d):
     """Turn sums of neighbours into Loop's smooth vertices begin … end − 1 (equation 3).
 
     ``beta``: Loop's weight of one neighbour, for each valence that occurs.
@@ -160,34 +150,3 @@ def blend_sharp(
             placed[v, k] = at_sharpness(
                 placed[v, k], curve, points[v, k], weights[v, 1], weights[v, 2]
             )
-
-
-@kernel
-def find_box(points: f8_2d, low: f8_1d, high: f8_1d):
-    """Write the least and the largest of each coordinate; NaN where one is."""
-    for k in range(3):
-        low[k], high[k] = math.inf, -math.inf
-    for v in range(points.shape[0]):
-        for k in range(3):
-            x = points[v, k]
-            if not x >= low[k]:
-                low[k] = x
-            if not x <= high[k]:
-                high[k] = x
-            if x != x:
-                low[k] = high[k] = x
-                return
-
-
-@kernel
-def largest_coordinate(points: f8_2d, begin: int, end: int):
-    """Return the largest absolute coordinate of rows begin … end − 1; NaN where one is."""
-    largest = 0.0
-    for v in range(max(begin, 0), end):
-        for k in range(3):
-            size = abs(points[v, k])
-            if not size <= largest:
-                largest = size
-                if size != size:
-                    return size
-    return largest

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from pns_common.kernels import f8_1d, i4_1d, i8_1d, kernel, u4_1d
+from pns_common.kernels import Connectivity, f8_1d, i8_1d, kernel, u4_1d
 
 
 @kernel
 def colour_stars(
-    corners: u4_1d, offsets: i4_1d, faces: i8_1d | u4_1d, starts: i8_1d, taken: i8_1d, colour: i8_1d
+    mesh: Connectivity, faces: i8_1d | u4_1d, starts: i8_1d, taken: i8_1d, colour: i8_1d
 ):
     """Colour vertices so that those on the faces around any one vertex differ; return how many.
 
     Args:
-        corners, offsets: vertices of the faces, and where the corners of each face begin.
         faces: (H,) the faces around vertex 0, 1, …, one after another.
         starts: (V + 1,) where those of each vertex begin.
         taken: (V + 1,) scratch; −1 on entry.
         colour: (V,) out; −1 on entry.
     """
-    most = 0
+    corners, offsets, most = mesh.corners, mesh.offsets, 0
     for v in range(colour.shape[0]):
         for around in range(starts[v], starts[v + 1]):
             f = faces[around]

@@ -8,19 +8,8 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import (
-    f8_1d,
-    f8_2d,
-    i1_1d,
-    i4_1d,
-    i4_2d,
-    i8_2d,
-    inlined,
-    kernel,
-    u4_1d,
-    u4_2d,
-)
-from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, face_of, skipped_block
+from pns_common.kernels import Connectivity, f8_1d, f8_2d, i4_1d, i8_2d, inlined, kernel, u4_2d
+from pns_common.kernels.connectivity import INTERIOR, SKIPPED_ROWS, face_of, rows_of_block
 from pns_common.kernels.vectors import (
     NO_AREA,
     between,
@@ -29,6 +18,7 @@ from pns_common.kernels.vectors import (
     dot,
     norm,
     normal_and_area,
+    over,
     root,
     row,
 )
@@ -43,7 +33,7 @@ SHORTEST_SQUARE = 1e-300
 
 
 @kernel
-def measure_faces(points: f8_2d, faces: u4_2d, begin: int, end: int, normals: f8_2d, areas: f8_2d):
+def measure_faces(begin: int, end: int, points: f8_2d, faces: u4_2d, normals: f8_2d, areas: f8_2d):
     """Write unit normals, and twice the area vectors with their lengths, of triangles.
 
     ``areas`` is (F, 4), or (0, 4) where it is not wanted.
@@ -60,24 +50,31 @@ def measure_faces(points: f8_2d, faces: u4_2d, begin: int, end: int, normals: f8
 
 
 @kernel
+def measure_quads(begin: int, end: int, points: f8_2d, faces: u4_2d, normals: f8_2d):
+    """Write the unit normals of quads begin … end − 1: of their area vectors; 0 without area."""
+    for f in range(max(begin, 0), end):
+        u = difference(row(points, faces[f, 2]), row(points, faces[f, 0]))
+        v = difference(row(points, faces[f, 3]), row(points, faces[f, 1]))
+        vector, shortest = cross(u, v), NO_AREA * (dot(u, u) + dot(v, v))
+        known = dot(vector, vector) > shortest * shortest
+        normal = over(vector, norm(vector)) if known else (0.0, 0.0, 0.0)
+        for k in range(3):
+            normals[f, k] = normal[k]
+
+
+@kernel
 def measure_polygons(
-    points: f8_2d,
-    corners: u4_1d,
-    offsets: i4_1d,
-    begin: int,
-    end: int,
-    normals: f8_2d,
-    areas: f8_2d,
+    begin: int, end: int, points: f8_2d, mesh: Connectivity, normals: f8_2d, areas: f8_2d
 ):
     """Write what ``measure_faces`` does, of polygons: their area vectors are sums over fans."""
     for f in range(max(begin, 0), end):
-        first, stop = offsets[f], offsets[f + 1]
-        origin = row(points, corners[first])
+        first, stop = mesh.offsets[f], mesh.offsets[f + 1]
+        origin = row(points, mesh.corners[first])
         vector, squares = (0.0, 0.0, 0.0), 0.0
-        before = difference(row(points, corners[first + 1]), origin)
+        before = difference(row(points, mesh.corners[first + 1]), origin)
         squares += dot(before, before)
         for h in range(first + 2, stop):
-            spoke = difference(row(points, corners[h]), origin)
+            spoke = difference(row(points, mesh.corners[h]), origin)
             part = cross(before, spoke)
             vector = vector[0] + part[0], vector[1] + part[1], vector[2] + part[2]
             squares += dot(spoke, spoke)
@@ -94,60 +91,30 @@ def measure_polygons(
 
 @kernel
 def measure_edges(
-    points: f8_2d,
-    normals: f8_2d,
-    corners: u4_1d,
-    face_of_corner: u4_1d,
-    edges: u4_2d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
     begin: int,
     end: int,
+    points: f8_2d,
+    normals: f8_2d,
+    mesh: Connectivity,
     lengths: f8_1d,
     jumps: f8_1d,
 ):
     """Write h and x = 1 − n1 · n2 of edges begin … end − 1; x is 0 where one is not interior."""
     for e in range(max(begin, 0), end):
-        spoke = between(points, edges[e, 0], edges[e, 1])
+        spoke = between(points, mesh.edges[e, 0], mesh.edges[e, 1])
         lengths[e], jumps[e] = root(dot(spoke, spoke)), 0.0
-        if edge_class[e] != INTERIOR:
+        if mesh.edge_class[e] != INTERIOR:
             continue
-        n = row(normals, face_of(half_edges[e, 0], face_of_corner))
-        m = row(normals, face_of(half_edges[e, 1], face_of_corner))
+        n = row(normals, face_of(mesh, mesh.half_edges[e, 0]))
+        m = row(normals, face_of(mesh, mesh.half_edges[e, 1]))
         if dot(n, n) > 0 and dot(m, m) > 0:
             chord = difference(n, m)
             jumps[e] = dot(chord, chord) / 2
 
 
 @kernel
-def turn_cosines(
-    normals: f8_2d,
-    face_of_corner: u4_1d,
-    half_edges: i4_2d,
-    edge_class: i1_1d,
-    begin: int,
-    end: int,
-    cosines: f8_1d,
-):
-    """Write n1 · n2 of edges begin … end − 1; 1 unless interior, and beside faces without area."""
-    for e in range(max(begin, 0), end):
-        cosines[e] = 1.0
-        if edge_class[e] == INTERIOR:
-            n = row(normals, face_of(half_edges[e, 0], face_of_corner))
-            m = row(normals, face_of(half_edges[e, 1], face_of_corner))
-            if dot(n, n) > 0 and dot(m, m) > 0:
-                cosines[e] = dot(n, m)
-
-
-@kernel
 def mean_normals(
-    corners: u4_1d,
-    face_of_corner: u4_1d,
-    reach: i8_2d,
-    areas: f8_2d,
-    begin: int,
-    end: int,
-    fields: f8_2d,
+    begin: int, end: int, mesh: Connectivity, reach: i8_2d, areas: f8_2d, fields: f8_2d
 ):
     """Write area-weighted mean normals of vertices begin … end − 1 into ``fields`` (V, 4).
 
@@ -157,13 +124,11 @@ def mean_normals(
         for k in range(FIELDS):
             fields[v, k] = 0.0
     for block in range(reach.shape[0]):
-        if reach[block, 1] < begin or reach[block, 0] >= end:
-            continue
-        first = 3 * SKIPPED_ROWS * block
-        for h in range(first, min(first + 3 * SKIPPED_ROWS, corners.shape[0])):
-            v = corners[h]
+        first, stop = rows_of_block(reach, block, 3 * SKIPPED_ROWS, len(mesh.corners), begin, end)
+        for h in range(first, stop):
+            v = mesh.corners[h]
             if begin <= v < end:
-                f = face_of(h, face_of_corner)
+                f = face_of(mesh, h)
                 for k in range(FIELDS):
                     fields[v, k] += areas[f, k]
     for v in range(max(begin, 0), end):
@@ -183,12 +148,12 @@ def _add_spoke(means, v, spoke, square, length):
 
 @kernel
 def mean_spokes(
+    begin: int,
+    end: int,
     points: f8_2d,
     edges: u4_2d,
     reach: i8_2d,
     sharp: i4_1d,
-    begin: int,
-    end: int,
     means: f8_2d,
     valence: i4_1d,
     fields: f8_2d,
@@ -203,8 +168,8 @@ def mean_spokes(
         for k in range(MEANS):
             means[v, k] = 0.0
     for block in range(reach.shape[0]):
-        first, count = skipped_block(edges, reach, block, begin, end)
-        for e in range(first, first + count):
+        first, stop = rows_of_block(reach, block, SKIPPED_ROWS, edges.shape[0], begin, end)
+        for e in range(first, stop):
             a, b = edges[e, 0], edges[e, 1]
             mine, theirs = begin <= a < end, begin <= b < end
             if not (mine or theirs):

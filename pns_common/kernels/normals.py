@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 
-from pns_common.kernels import b1_2d, f4_2d, f8_2d, i1_1d, i4_2d, i8_1d, i8_2d, inlined, kernel
-from pns_common.kernels.connectivity import INTERIOR, next_corner
+from pns_common.kernels import b1_2d, f4_2d, f8_2d, i4_2d, i8_2d, inlined, kernel
 from pns_common.kernels.vectors import across, between, cross, divisor, dot, norm, over, row
 
 # Unit vectors whose weighted sum is shorter have no direction to trust.
@@ -54,11 +53,11 @@ def angle_between(sine, cosine):
 
 @kernel
 def mark_opposed(
+    begin: int,
+    end: int,
     points: f4_2d | f8_2d,
     normals: f4_2d,
     faces: i4_2d | i8_2d,
-    begin: int,
-    end: int,
     opposed: b1_2d,
 ):
     """Mark the corners of faces begin … end − 1 whose normal is more than 90 degrees off."""
@@ -72,11 +71,11 @@ def mark_opposed(
 
 @kernel
 def measure_triangles(
+    begin: int,
+    end: int,
     points: f8_2d,
     faces: i4_2d | i8_2d,
     triangles: i8_2d,
-    begin: int,
-    end: int,
     normals: f8_2d,
     angles: f8_2d,
 ):
@@ -95,11 +94,8 @@ def measure_triangles(
     for f in range(begin, end):
         whole = 0.0, 0.0, 0.0
         for d in range(count):
-            a, b, c = (
-                faces[f, triangles[d, 0]],
-                faces[f, triangles[d, 1]],
-                faces[f, triangles[d, 2]],
-            )
+            a, b = faces[f, triangles[d, 0]], faces[f, triangles[d, 1]]
+            c = faces[f, triangles[d, 2]]
             ab, bc, ca = between(points, a, b), between(points, b, c), between(points, c, a)
             vector = cross(ca, ab)
             twice_area = norm(vector)
@@ -143,7 +139,7 @@ def scale_to_unit(begin: int, end: int, total: f8_2d):
 
 
 @kernel
-def perpendicular_tangents(tangents: f8_2d, normals: f8_2d, begin: int, end: int, made: f8_2d):
+def perpendicular_tangents(begin: int, end: int, tangents: f8_2d, normals: f8_2d, made: f8_2d):
     """Write the unit projections of tangents begin … end − 1 onto the planes of unit normals."""
     for r in range(begin, end):
         tangent, normal = row(tangents, r), row(normals, r)
@@ -162,42 +158,3 @@ def _farthest_axis(normal):
     if z < min(x, y):
         return 0.0, 0.0, 1.0
     return (0.0, 1.0, 0.0) if y < x else (1.0, 0.0, 0.0)
-
-
-@inlined
-def _join(fans, g, h):
-    """Join the fans of two corners; the lower first corner names both."""
-    while fans[g] != g:
-        fans[g] = fans[fans[g]]
-        g = fans[g]
-    while fans[h] != h:
-        fans[h] = fans[fans[h]]
-        h = fans[h]
-    if g < h:
-        fans[h] = g
-    else:
-        fans[g] = h
-
-
-@kernel
-def join_corners(half_edges: i4_2d, edge_class: i1_1d, fans: i8_1d):
-    """Write the fan of each corner (3 F,), numbered by first appearance; return how many.
-
-    Across each interior edge the corners of both faces are joined, at either end.
-    """
-    for h in range(fans.shape[0]):
-        fans[h] = h
-    for e in range(half_edges.shape[0]):
-        if edge_class[e] == INTERIOR:
-            there, back = half_edges[e, 0], half_edges[e, 1]
-            _join(fans, there, next_corner(back))
-            _join(fans, next_corner(there), back)
-    # Every corner names an earlier one, which has its fan's number by then, or is its fan's first.
-    count = 0
-    for h in range(fans.shape[0]):
-        if fans[h] == h:
-            fans[h] = count
-            count += 1
-        else:
-            fans[h] = fans[fans[h]]
-    return count

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.errors import ParameterError
-from pns_common.kernels import measures
 from pns_common.mesh.normals import measure_faces
+from pns_common.mesh.rows import dot
 from pns_common.mesh.topology import MOSTLY_SHARP, Topology, check_vertices
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_masked, is_number, is_whole
@@ -226,12 +226,15 @@ def edge_cosines(
     """Return n1 · n2 of interior edges; 1 at other edges and beside faces without area."""
     if normals is None:
         normals, _ = measure_faces(points, topology, blocks or Blocks(), areas=False)
-    cosine = np.empty(len(topology.edges))
-    read = topology.face_of_corner, topology.half_edges, topology.edge_class
-    (blocks or Blocks()).run(
-        len(cosine),
-        lambda begin, end: measures.turn_cosines(normals, *read, begin, end, cosine),
-    )
+    inside, cosine = topology.interior, np.ones(len(topology.edges))
+
+    def compare(begin: int, end: int) -> None:
+        rows = inside[begin:end]
+        n, m = (normals[topology.face_of(topology.half_edges[rows, side])] for side in (0, 1))
+        known = (dot(n, n) > 0) & (dot(m, m) > 0)
+        cosine[rows] = np.where(known, dot(n, m), 1.0)
+
+    (blocks or Blocks()).run(len(inside), compare)
     return cosine
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import MeshError, ParameterError
-from pns_common.kernels import loop as kernels
+from pns_common.mesh.rows import extent
 from pns_common.mesh.topology import Topology, build_topology
 from pns_common.parallel import Blocks
 from pns_common.parameters import is_masked
@@ -436,8 +436,7 @@ def _check_indices(
 
 
 def _check_coordinates(vertices: Float[np.ndarray, "V 3"]) -> None:
-    low, high = np.empty((2, 3))
-    kernels.find_box(vertices, low, high)
+    low, high = extent(vertices)
     # Written so that NaN fails it too.
     if not ((low >= -LARGEST_COORDINATE) & (high <= LARGEST_COORDINATE)).all():
         fits = (np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1)

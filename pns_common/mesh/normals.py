@@ -7,7 +7,9 @@ from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import measures
 from pns_common.kernels import normals as kernels
-from pns_common.mesh.topology import Topology, build_topology
+from pns_common.mesh.rows import number_by_first_appearance
+from pns_common.mesh.sectors import find_sectors
+from pns_common.mesh.topology import TRIANGLE, Topology, build_topology
 from pns_common.parallel import Blocks
 
 NO_AREAS = np.zeros((0, 4))
@@ -17,15 +19,15 @@ ONE_TRIANGLE = np.array([[0, 1, 2]])
 
 def face_normals(
     points: Float[np.ndarray, "V 3"],
-    faces: Integer[np.ndarray, "F 3"],
+    faces: Integer[np.ndarray, "F N"],
     blocks: Blocks | None = None,
 ) -> Float[np.ndarray, "F 3"]:
-    """Return the unit normals of triangles; 0 for a triangle without area."""
-    normals = np.empty((len(faces), 3))
-    (blocks or Blocks()).run(
-        len(faces),
-        lambda begin, end: measures.measure_faces(points, faces, begin, end, normals, NO_AREAS),
-    )
+    """Return the unit normals of triangles, or of quads; 0 without area."""
+    normals, blocks = np.empty((len(faces), 3)), blocks or Blocks()
+    if faces.shape[1] == TRIANGLE:
+        blocks.run(len(faces), measures.measure_faces, points, faces, normals, NO_AREAS)
+    else:
+        blocks.run(len(faces), measures.measure_quads, points, faces, normals)
     return normals
 
 
@@ -39,20 +41,9 @@ def measure_faces(
     """
     count, mesh = topology.face_count, topology
     normals, vectors = np.empty((count, 3)), np.empty((count if areas else 0, 4))
-    if mesh.triangles:
-        blocks.run(
-            count,
-            lambda begin, end: measures.measure_faces(
-                points, mesh.faces, begin, end, normals, vectors
-            ),
-        )
-    else:
-        blocks.run(
-            count,
-            lambda begin, end: measures.measure_polygons(
-                points, mesh.corners, mesh.offsets, begin, end, normals, vectors
-            ),
-        )
+    measure = measures.measure_faces if mesh.triangles else measures.measure_polygons
+    faces = mesh.faces if mesh.triangles else mesh.connectivity
+    blocks.run(count, measure, points, faces, normals, vectors)
     return normals, vectors
 
 
@@ -80,14 +71,11 @@ def angle_weighted_normals(
     """
     made = len(faces) * len(triangles)
     normals, angles, total = np.empty((made, 3)), np.empty((made, 2)), np.zeros((count, 3))
-    blocks.run(
-        len(faces),
-        lambda begin, end: kernels.measure_triangles(
-            points, faces, triangles, begin, end, normals, angles
-        ),
-    )
+    read = points, faces, triangles
+    blocks.run(len(faces), kernels.measure_triangles, *read, normals, angles)
     kernels.add_corners(normals, angles, groups, triangles, total)
-    blocks.quiet().run(count, lambda begin, end: kernels.scale_to_unit(begin, end, total))
+    # Blocks of groups, not of faces of many triangles.
+    Blocks(blocks.threads).run(count, kernels.scale_to_unit, total)
     return total
 
 
@@ -99,10 +87,7 @@ def opposed_corners(
 ) -> Bool[np.ndarray, "F 3"]:
     """Return the corners whose normal is more than 90 degrees off their triangle's own."""
     opposed = np.empty((len(faces), 3), dtype=np.bool_)
-    blocks.run(
-        len(faces),
-        lambda begin, end: kernels.mark_opposed(points, normals, faces, begin, end, opposed),
-    )
+    blocks.run(len(faces), kernels.mark_opposed, points, normals, faces, opposed)
     return opposed
 
 
@@ -118,9 +103,8 @@ def smooth_fans(
     topology = build_topology(faces, vertex_count)
     if creases is not None:
         topology = topology.with_creases(topology.rows_of(creases))
-    fans = np.empty(3 * len(faces), dtype=np.int64)
-    kernels.join_corners(topology.half_edges, topology.edge_class, fans)
-    return fans.reshape(-1, 3)
+    around = find_sectors(topology.connectivity)
+    return number_by_first_appearance(around.of_corner)[0].reshape(-1, TRIANGLE)
 
 
 def perpendicular_tangents(
@@ -133,7 +117,5 @@ def perpendicular_tangents(
     """
     made = np.empty(tangents.shape)
     given = [np.ascontiguousarray(part, dtype=np.float64) for part in (tangents, normals)]
-    blocks.run(
-        len(made), lambda begin, end: kernels.perpendicular_tangents(*given, begin, end, made)
-    )
+    blocks.run(len(made), kernels.perpendicular_tangents, *given, made)
     return made

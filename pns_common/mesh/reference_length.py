@@ -7,7 +7,7 @@ import math
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.kernels import children
+from pns_common.mesh.rows import dot, marked
 
 
 def measure_reference_length(
@@ -18,6 +18,8 @@ def measure_reference_length(
     It is about 1 on the paper's patches over [−1, 1]², unchanged by rotation, and proportional to
     scale.
     """
-    used, total = np.zeros(len(vertices), dtype=bool), np.zeros(3)
-    count = children.referenced_sum(vertices, corners, used, total)
-    return children.farthest(vertices, used, total / count) / math.sqrt(2)
+    used = marked(corners, len(vertices))
+    points = vertices if used.all() else vertices[used]
+    # Summed in order: sums in pairs have other bits.
+    away = points - np.add.accumulate(points)[-1] / len(points)
+    return math.sqrt(dot(away, away).max()) / math.sqrt(2)

@@ -79,6 +79,14 @@ def marked(rows: Integer[np.ndarray, "*N"], count: int) -> Bool[np.ndarray, " S"
     return marks
 
 
+def ranges(
+    first: Integer[np.ndarray, " N"], counts: Integer[np.ndarray, " N"], step: int = 1
+) -> Integer[np.ndarray, " M"]:
+    """Return ``counts`` numbers from each of ``first`` on, one range after another."""
+    before = np.cumsum(counts) - counts
+    return np.repeat(first - step * before, counts) + step * np.arange(int(counts.sum()))
+
+
 def extent(
     points: Float[np.ndarray, "N K"],
 ) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, " K"]]:

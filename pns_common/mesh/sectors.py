@@ -1,4 +1,4 @@
-"""Sectors around vertices, between sharp edges; normals that masks along them give.
+"""Sectors around vertices, between sharp edges.
 
 A sector holds the corners around a vertex between two edges that are not interior, anticlockwise;
 or all corners of a closed fan.
@@ -6,31 +6,13 @@ or all corners of a closed fan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Integer, Shaped
+from jaxtyping import Integer
 
-from pns_common.kernels import limit as kernels
-from pns_common.mesh.topology import Topology
-
-CLOSED, DART, CURVE, CORNER = 0, 1, 2, 3
-
-
-@dataclass(frozen=True, eq=False)
-class LimitNormals:
-    """Unit normals; 0 where there is no area, and where those of a vertex's sectors cancel.
-
-    Attributes:
-        vertices: of each vertex; on a crease or where fans meet the unit mean of its sectors'.
-        sectors: of each sector: one-sided at boundaries and creases.
-        sector_of_corner: the sector of corner 3 f + i, for a normal at each face's corner.
-    """
-
-    vertices: Float[np.ndarray, "V 3"]
-    sectors: Float[np.ndarray, "S 3"]
-    sector_of_corner: Integer[np.ndarray, " C"]
+from pns_common.kernels.limit import label_sectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +25,8 @@ class Sectors:
         size: how many corners it has.
         opened: how many sectors are open; these come first.
         vertex: of each sector.
+        spokes: vertices around these, sector by sector; see ``kernels.limit``.
+        starts: where the spokes of each sector begin, and their number at the end.
     """
 
     of_corner: Integer[np.ndarray, " C"]
@@ -50,56 +34,21 @@ class Sectors:
     size: Integer[np.ndarray, " S"]
     opened: int
     vertex: Integer[np.ndarray, " S"]
+    spokes: Integer[np.ndarray, " K"]
+    starts: Integer[np.ndarray, " S1"]
 
 
-def find_sectors(topology: Topology) -> Sectors:
-    """Return the sectors of a mesh."""
-    corners, *walked = walked_arrays(topology)
+def find_sectors(mesh: Any, *, quads: bool = False) -> Sectors:
+    """Return the sectors of a ``Connectivity``.
+
+    ``quads``: with spokes in the quads that corners become.
+    """
+    corners = mesh.corners
     of_corner = np.full(len(corners), -1, dtype=np.int32)
     first, size = np.empty((2, len(corners)), dtype=np.int32)
-    opened, count = kernels.label_sectors(*walked, of_corner, first, size)
-    first = first[:count].copy()
-    return Sectors(of_corner, first, size[:count].copy(), opened, corners[first])
-
-
-def walked_arrays(topology: Topology) -> tuple[np.ndarray, ...]:
-    """Return what a walk around a vertex reads."""
-    mesh = topology
-    of_faces = mesh.corners, mesh.offsets, mesh.face_of_corner
-    return *of_faces, mesh.corner_edges, mesh.half_edges, mesh.edge_class
-
-
-def sector_kinds(topology: Topology, around: Sectors) -> Integer[np.ndarray, " S"]:
-    """Return the kind of each sector: closed, or by the sharp edges at its vertex.
-
-    A corner inside a smooth surface is the tip of a cone: its sector stays closed, and its normal
-    is that of the ring.
-    """
-    kind = np.full(len(around.first), CLOSED, dtype=np.int64)
-    if around.opened:
-        sharp = topology.sharp_count
-        if len(topology.vertex_sharpness):
-            sharp = np.where((topology.corner_weights == 1) & (sharp == CURVE), CORNER, sharp)
-        kind[: around.opened] = np.minimum(sharp[around.vertex[: around.opened]], CORNER)
-    return kind
-
-
-def normals_of_sectors(
-    sectors: Float[np.ndarray, "S 3"], around: Sectors, vertex_count: int
-) -> LimitNormals:
-    """Return normals of vertices beside those of their sectors."""
-    vertices, lengths = np.zeros((vertex_count, 3)), np.zeros(vertex_count)
-    kernels.mean_of_sectors(sectors, around.vertex, vertices, lengths)
-    return LimitNormals(vertices, sectors, around.of_corner)
-
-
-def mask_tables(
-    make: Callable[[int, int], np.ndarray],
-    kind: Shaped[np.ndarray, " S"],
-    size: Integer[np.ndarray, " S"],
-) -> tuple[Integer[np.ndarray, " S"], Float[np.ndarray, " *M"]]:
-    """Return ``make(kind, size)`` for all pairs that occur, in a row, and where each one begins."""
-    keys, which = np.unique(4 * size.astype(np.int64) + kind, return_inverse=True)
-    tables = [make(int(key % 4), int(key // 4)) for key in keys]
-    starts = np.cumsum([0, *map(len, tables)])[:-1]
-    return starts[which.reshape(-1)], np.concatenate(tables)
+    spokes = np.empty((3 if quads else 2) * len(corners), dtype=np.uint32)
+    to = of_corner, first, size, spokes
+    opened, count = label_sectors(mesh, quads, *to)
+    first, size = first[:count].copy(), size[:count].copy()
+    starts = np.append(0, np.cumsum(1 + (2 if quads else 1) * size.astype(np.int64)))
+    return Sectors(of_corner, first, size, opened, corners[first], spokes, starts)

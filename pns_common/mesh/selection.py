@@ -80,31 +80,31 @@ def select(
     """
     degree, each, every = refined.shape[1], int(4**levels), np.arange(len(mesh.corners))
     picked = chosen[mesh.face_of(every)]
-    own, rest = np.flatnonzero(picked), np.flatnonzero(~picked)
-    split = marked(mesh.corner_edges[own], len(mesh.edges))[mesh.corner_edges[rest]]
-    along = _along(rest, following(mesh.offsets)[rest], levels, degree)
+    inner, outer = np.flatnonzero(picked), np.flatnonzero(~picked)
+    split = marked(mesh.corner_edges[inner], len(mesh.edges))[mesh.corner_edges[outer]]
+    along = _along(outer, following(mesh.offsets)[outer], levels, degree)
     if degree == SIDES:
         places, owner = _cut(along.reshape(-1, SIDES, 2**levels), split.reshape(-1, SIDES))
-        owner = rest[SIDES * owner]
+        owner = outer[SIDES * owner]
     else:
         points = np.ones(along.shape, dtype=bool)
         points[~split, 1:] = False
-        places, owner = along[points], np.repeat(rest, points.sum(axis=1))
+        places, owner = along[points], np.repeat(outer, points.sum(axis=1))
     counts = np.where(picked, each, np.bincount(owner, minlength=len(picked)))
-    made = np.empty(counts.sum(), dtype=np.int64)
+    where = np.empty(counts.sum(), dtype=np.int64)
     inside = np.repeat(picked, counts)
-    made[inside] = np.add.outer(each * own, np.arange(each)).reshape(-1)
-    made[~inside] = places
-    offsets = np.arange(0, len(made) + 1, degree)
+    where[inside] = np.add.outer(each * inner, np.arange(each)).reshape(-1)
+    where[~inside] = places
+    offsets = np.arange(0, len(where) + 1, degree)
     if degree != SIDES:
         sides = np.add.reduceat(counts, mesh.offsets[:-1])
         faces = np.where(chosen, sides // degree, 1)
         offsets = np.append(0, np.cumsum(np.repeat(sides // faces, faces)))
-    corners = refined.reshape(-1)[made]
-    kept = marked(corners, count)
-    kept[: mesh.vertex_count] = True
-    still = ~marked(mesh.corners[own], mesh.vertex_count)
-    return Selected(made, offsets, (np.cumsum(kept) - 1)[corners], np.flatnonzero(kept), still)
+    corners = refined.reshape(-1)[where]
+    stays = marked(corners, count)
+    stays[: mesh.vertex_count] = True
+    still = ~marked(mesh.corners[inner], mesh.vertex_count)
+    return Selected(where, offsets, (np.cumsum(stays) - 1)[corners], np.flatnonzero(stays), still)
 
 
 def _along(

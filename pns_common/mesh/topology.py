@@ -1,4 +1,4 @@
-"""Connectivity of a mesh: edges, edge classes and sharpness, fans; the split into triangles.
+"""Connectivity of a mesh: edges, edge classes and sharpness, fans; splits of its faces.
 
 Nothing here knows positions. The orders are part of the result: edges are numbered by first
 appearance over the faces, (a, b), (b, c), … from each face's first corner on.
@@ -14,17 +14,24 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt32
 
 from pns_common.errors import MeshError, ParameterError
+from pns_common.kernels import Connectivity, loop, split
 from pns_common.kernels import connectivity as kernels
-from pns_common.kernels import loop
+from pns_common.mesh.rows import marked
+from pns_common.mesh.sectors import find_sectors
 from pns_common.parallel import LEAST_ROWS, Blocks
 
 # Steps along chains that an edge may take on average; beyond that, sorting is as fast.
 STEPS = 32
-TRIANGLE = 3
+TRIANGLE, QUAD = 3, split.QUAD
 NO_WEIGHTS = np.zeros(0)
 # Edges of a sharpness above this count as sharp where there is only yes and no.
 MOSTLY_SHARP = 1 / 2
 NO_FACES = np.zeros(0, dtype=np.uint32)
+
+
+def some_weights(weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " W"]:
+    """Return weights; (0,) where all are 0."""
+    return weights if weights.any() else NO_WEIGHTS
 
 
 class EdgeClass(IntEnum):
@@ -96,6 +103,11 @@ class Topology:
     wear: Float[np.ndarray, " W"] = field(default_factory=lambda: NO_WEIGHTS)
     found: Float[np.ndarray, " SW"] = field(default_factory=lambda: NO_WEIGHTS)
 
+    @cached_property
+    def connectivity(self) -> Connectivity:
+        """The arrays that loops read."""
+        return Connectivity(*(getattr(self, name) for name in Connectivity._fields))
+
     @property
     def face_count(self) -> int:
         """Number of faces."""
@@ -147,9 +159,12 @@ class Topology:
         """Number of edges at each vertex that are not interior; (0,) where there is none."""
         if len(self.sharp_edges) == 0:
             return np.zeros(0, dtype=np.int32)
-        counts = np.zeros(self.vertex_count, dtype=np.int32)
-        kernels.count_ends(self.edges, self.sharp_edges, counts)
-        return counts
+        return self.count_ends(self.sharp_edges)
+
+    def count_ends(self, rows: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " V"]:
+        """Return how many of some edges end at each vertex."""
+        ends = self.edges[rows].reshape(-1)
+        return np.bincount(ends, minlength=self.vertex_count).astype(np.int32)
 
     @cached_property
     def sharpness(self) -> Float[np.ndarray, " E"]:
@@ -167,10 +182,10 @@ class Topology:
     @property
     def corner_weights(self) -> Float[np.ndarray, " V"]:
         """Corner weight κ of every vertex."""
-        made = np.zeros(self.vertex_count)
+        weights = np.zeros(self.vertex_count)
         if len(self.vertex_sharpness):
-            made = np.minimum(self.vertex_sharpness, 1.0)
-        return np.maximum(made, self.soft_corners) if len(self.soft_corners) else made
+            weights = np.minimum(self.vertex_sharpness, 1.0)
+        return np.maximum(weights, self.soft_corners) if len(self.soft_corners) else weights
 
     @property
     def has_corners(self) -> bool:
@@ -222,8 +237,8 @@ class Topology:
             on_boundary = classes == kernels.BOUNDARY
             if on_boundary.any():
                 ends = np.unique(self.edges[on_boundary])
-                marked = np.where(self.wear > 0, soft, 0.0) if len(self.wear) else NO_WEIGHTS
-                at_ends, beside = self._sharpest_of(classes, marked)
+                given = np.where(self.wear > 0, soft, 0.0) if len(self.wear) else NO_WEIGHTS
+                at_ends, beside = self._sharpest_of(classes, given)
                 weights[ends], neighbours[ends] = at_ends[ends], beside[ends]
         return weights, neighbours
 
@@ -251,28 +266,15 @@ class Topology:
         return _reach(self.corners, TRIANGLE * kernels.SKIPPED_ROWS, self.vertex_count)
 
     @cached_property
+    def fan_count(self) -> Integer[np.ndarray, " V"]:
+        """Number of fans that the faces of each vertex form; creases divide none."""
+        around = find_sectors(self.without_creases().connectivity)
+        return np.bincount(around.vertex, minlength=self.vertex_count)
+
+    @property
     def multi_fan_vertices(self) -> Bool[np.ndarray, " V"]:
         """True for vertices whose faces form more than one fan, as at the knot of a bow-tie."""
-        return self.count_fans(Blocks()) > 1
-
-    def count_fans(self, blocks: Blocks) -> Integer[np.ndarray, " V"]:
-        """Return how many fans the faces of each vertex form: 0, 1, or 2 for more."""
-        corner, count = np.zeros((2, self.vertex_count), dtype=np.int32)
-        made = np.empty(self.vertex_count, dtype=np.int8)
-        blocks.owners(self.vertex_count).run(
-            self.vertex_count,
-            lambda begin, end: kernels.count_corners(
-                self.corners, self.corner_reach, begin, end, corner, count
-            ),
-        )
-        fans = self.offsets, self.face_of_corner, self.corner_edges, self.half_edges
-        blocks.run(
-            self.vertex_count,
-            lambda begin, end: kernels.count_fans(
-                *fans, self.edge_class, corner, count, begin, end, made
-            ),
-        )
-        return made
+        return self.fan_count > 1
 
     def with_creases(self, rows: Integer[np.ndarray, " N"]) -> Topology:
         """Return a copy in which the interior edges among ``rows`` are creases."""
@@ -287,22 +289,20 @@ class Topology:
 
         Those of w = 1 are creases.
         """
-        made = self.with_creases(np.flatnonzero(sharpness >= 1))
-        soft = np.where(made.edge_class == kernels.INTERIOR, sharpness, 0.0)
-        if len(self.soft):
-            soft = np.maximum(soft, np.where(made.edge_class == kernels.INTERIOR, self.soft, 0.0))
-        made = replace(made, soft=soft if soft.any() else NO_WEIGHTS)
+        sharper = self.with_creases(np.flatnonzero(sharpness >= 1))
+        soft = np.maximum(sharpness, self.soft) if len(self.soft) else sharpness
+        soft = np.where(sharper.edge_class == kernels.INTERIOR, soft, 0.0)
+        found = self.found
         if len(self.wear):
             found = np.where((self.wear > 0) & np.isfinite(self.wear), sharpness, 0.0)
-            made = replace(made, found=found if found.any() else NO_WEIGHTS)
-        return made
+        return replace(sharper, soft=some_weights(soft), found=some_weights(found))
 
     def with_wear(self, sharpness: Float[np.ndarray, " E"]) -> Topology:
         """Return a copy whose interior edges are sharp for so many levels, infinity for good."""
-        made = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
-        made = made.with_sharpness(np.minimum(sharpness, 1.0))
+        lasting = replace(self, wear=NO_WEIGHTS, found=NO_WEIGHTS)
+        sharper = lasting.with_sharpness(np.minimum(sharpness, 1.0))
         wear = np.where(self.edge_class == kernels.INTERIOR, sharpness, 0.0)
-        return replace(made, wear=wear if wear.any() else NO_WEIGHTS)
+        return replace(sharper, wear=some_weights(wear))
 
     def worn(
         self,
@@ -320,20 +320,20 @@ class Topology:
             return self
         rows = np.flatnonzero(parent.wear)
         if halves is None:
-            own = self.rows_of(halves_of(parent, rows)).reshape(-1, 2)
+            worn = self.rows_of(halves_of(parent, rows)).reshape(-1, 2)
         else:
-            own = halves[rows].astype(np.int64)
-        classes, soft, left = self.edge_class.copy(), self.soft.copy(), np.zeros(len(self.edges))
-        classes[own] = kernels.INTERIOR
+            worn = halves[rows].astype(np.int64)
+        classes, soft = self.edge_class.copy(), self.soft.copy()
+        classes[worn] = kernels.INTERIOR
         if len(soft):
-            soft[own] = 0.0
-        left[own] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
-        made = replace(self, edge_class=classes, soft=soft).with_wear(left)
+            soft[worn] = 0.0
+        left, found = np.zeros((2, len(self.edges)))
+        left[worn] = np.maximum(parent.wear[rows] - 1, 0.0)[:, None]
+        split_mesh = replace(self, edge_class=classes, soft=soft).with_wear(left)
         if inherit and len(parent.found):
-            found = np.zeros(len(self.edges))
-            found[own] = parent.found[rows][:, None]
-            made = made.with_sharpness(found)
-        return made
+            found[worn] = parent.found[rows][:, None]
+            split_mesh = split_mesh.with_sharpness(found)
+        return split_mesh
 
     def with_border(self, rule: str) -> Topology:
         """Return a copy whose boundaries keep a rule of ``creases.BORDERS``."""
@@ -349,7 +349,7 @@ class Topology:
         """Return a copy whose vertices are so sharp, where they are less."""
         if len(self.vertex_sharpness):
             sharpness = np.maximum(sharpness, self.vertex_sharpness)
-        return replace(self, vertex_sharpness=sharpness if sharpness.any() else NO_WEIGHTS)
+        return replace(self, vertex_sharpness=some_weights(sharpness))
 
     def with_soft_corners(self, weights: Float[np.ndarray, " V"]) -> Topology:
         """Return a copy with learned corner weights, where they are less."""
@@ -360,12 +360,12 @@ class Topology:
     def soft_corners_of_split(self, count: int, *, inherit: bool) -> Float[np.ndarray, " SV"]:
         """Return ``soft_corners`` a level later, where there are ``count`` vertices.
 
-        Those of weight 1, as where a border turns, stay for good.
+        Those of weight 1, as where a boundary turns, stay for good.
         """
-        kept = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
-        if not (kept.any() or (inherit and len(kept))):
+        weights = self.soft_corners if inherit else np.where(self.soft_corners < 1, 0, 1.0)
+        if not (weights.any() or (inherit and len(weights))):
             return NO_WEIGHTS
-        return np.concatenate([kept, np.zeros(count - self.vertex_count)])
+        return np.concatenate([weights, np.zeros(count - self.vertex_count)])
 
     def worn_vertices(self, count: int) -> Float[np.ndarray, " K"]:
         """Return ``vertex_sharpness`` a level later, where there are ``count`` vertices."""
@@ -386,33 +386,25 @@ class Topology:
         """Return a copy without soft edges and learned corners: what a user or a file marks."""
         return replace(self, soft=NO_WEIGHTS, soft_corners=NO_WEIGHTS)
 
-    def rows_of(
-        self, pairs: Integer[np.ndarray, "N 2"], name: str = "creases"
-    ) -> Integer[np.ndarray, " N"]:
+    def rows_of(self, pairs: Integer[np.ndarray, "N 2"]) -> Integer[np.ndarray, " N"]:
         """Return the edges that pairs of vertices name.
 
         Raises:
-            ParameterError: a pair is no edge; ``name`` is the argument's.
+            ParameterError: a pair is no edge.
         """
-        check_vertices(name, pairs, self.vertex_count)
-        named = np.zeros(self.vertex_count, dtype=bool)
-        named[pairs.reshape(-1)] = True
+        check_vertices("creases", pairs, self.vertex_count)
+        named = marked(pairs, self.vertex_count)
         near = np.flatnonzero(named[self.edges[:, 0]] & named[self.edges[:, 1]])
         keys, asked = (_keys(ends, self.vertex_count) for ends in (self.edges[near], pairs))
         order = np.argsort(keys, kind="stable")
-        if len(near) == 0:
-            found = np.zeros(len(asked), dtype=bool)
-            place = np.zeros(len(asked), dtype=np.int64)
-        else:
-            place = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
-            found = keys[place] == asked
+        place = np.searchsorted(keys, asked, sorter=order)
+        found = np.append(keys[order], -1)[place] == asked
         lost = np.flatnonzero(~found)
         if len(lost):
             row = int(lost[0])
-            raise ParameterError(
-                f"{name}[{row}]", pairs[row].tolist(), expected="an edge of the mesh"
-            )
-        return near[place]
+            pair = pairs[row].tolist()
+            raise ParameterError(f"creases[{row}]", pair, expected="an edge of the mesh")
+        return near[order[place]]
 
 
 def build_topology(
@@ -445,7 +437,7 @@ def build_topology(
     face_of_corner = NO_FACES
     if not triangles:
         face_of_corner = np.repeat(np.arange(len(degrees), dtype=np.uint32), degrees)
-    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count, blocks)
+    edges, half_edges, corner_edges, plain = _number_edges(corners, offsets, vertex_count)
     repeats, repeating = np.zeros(0, dtype=bool), False
     if not (plain and triangles):
         repeats = np.empty(len(offsets) - 1, dtype=bool)
@@ -453,9 +445,7 @@ def build_topology(
         repeating = kernels.mark_repeats(corners, offsets, last_face, repeats)
     edge_class = np.empty(len(edges), dtype=np.int8)
     known = corners, face_of_corner, repeats if repeating else repeats[:0], half_edges
-    blocks.run(
-        len(edges), lambda begin, end: kernels.classify_edges(*known, begin, end, edge_class)
-    )
+    blocks.run(len(edges), kernels.classify_edges, *known, edge_class)
     return Topology(
         vertex_count,
         corners,
@@ -482,70 +472,84 @@ def split_triangles(parent: Topology, blocks: Blocks, *, inherit: bool = True) -
         blocks: how the work is shared.
         inherit: whether the halves of creases and soft edges inherit their sharpness.
     """
-    faces, vertex_count = split_faces(parent, blocks), parent.vertex_count + len(parent.edges)
-    worn = parent.worn_vertices(vertex_count)
+    return split_into(split_faces(parent, blocks), parent, blocks, inherit=inherit)
+
+
+def split_into(
+    faces: UInt32[np.ndarray, "C N"], parent: Topology, blocks: Blocks, *, inherit: bool
+) -> Topology:
+    """Return the topology of a split into faces: triangles in four, or each corner into a quad."""
+    quads, edge_count, count = faces.shape[1] != TRIANGLE, len(parent.edges), len(parent.corners)
+    vertex_count = parent.vertex_count + edge_count + (parent.face_count if quads else 0)
+    offsets = np.arange(0, faces.size + 1, faces.shape[1], dtype=np.int32)
     soft_corners = parent.soft_corners_of_split(vertex_count, inherit=inherit)
+    vertices = {
+        "vertex_sharpness": parent.worn_vertices(vertex_count),
+        "soft_corners": soft_corners,
+    }
     if not parent.plain:
-        made = build_topology(faces, vertex_count, blocks)
-        made = replace(made, vertex_sharpness=worn, soft_corners=soft_corners)
-        return (inheriting(made, parent) if inherit else made).worn(parent, inherit=inherit)
-    soft = parent.soft
-    source = parent if inherit else parent.without_creases()
-    face_count, edge_count = parent.face_count, len(parent.edges)
-    halves = np.empty((edge_count, 2), dtype=np.uint32)
-    arrays = parent.faces, parent.face_edges
-    blocks.run(
-        face_count,
-        lambda begin, end: kernels.number_halves(
-            *arrays, parent.edges, parent.half_edges, begin, end, halves
-        ),
-    )
-    count = 2 * edge_count + 3 * face_count
+        split_mesh = build_topology((faces.reshape(-1), offsets), vertex_count, blocks)
+        split_mesh = replace(split_mesh, **vertices)
+        if inherit:
+            soft, creases = np.flatnonzero(parent.soft), parent.crease_edges
+            halves = split_mesh.rows_of(halves_of(parent, np.concatenate([soft, creases])))
+            sharpness = np.zeros(len(split_mesh.edges))
+            sharpness[halves] = np.append(parent.soft[soft], np.ones(len(creases))).repeat(2)
+            split_mesh = split_mesh.with_sharpness(sharpness)
+        return split_mesh.worn(parent, inherit=inherit)
+    read = (parent if inherit else parent.without_creases()).connectivity
+    halves, corner_edges = np.empty((edge_count, 2), np.uint32), np.empty(faces.shape, np.uint32)
+    blocks.run(parent.face_count, split.number_halves, read, quads, halves)
+    # Each edge has two halves, and each corner an edge inside of its face.
+    count += 2 * edge_count
     edges, half_edges = np.empty((count, 2), np.uint32), np.empty((count, 2), np.int32)
-    edge_class, face_edges = np.empty(count, np.int8), np.empty((4 * face_count, 3), np.uint32)
-    read = *arrays, source.half_edges, source.edge_class, halves, parent.vertex_count
-    to = face_edges, edges, half_edges, edge_class
-    blocks.run(face_count, lambda begin, end: kernels.split_edges(*read, begin, end, *to))
-    child_soft = NO_WEIGHTS
-    if inherit and len(soft):
-        child_soft = np.zeros(count)
-        rows = np.flatnonzero(soft)
-        child_soft[halves[rows]] = soft[rows, None]
-    made = Topology(
+    edge_class, soft = np.empty(count, np.int8), NO_WEIGHTS
+    to = corner_edges, edges, half_edges, edge_class
+    blocks.run(parent.face_count, split.split_edges, read, quads, halves, *to)
+    if inherit and len(parent.soft):
+        rows, soft = np.flatnonzero(parent.soft), np.zeros(count)
+        soft[halves[rows]] = parent.soft[rows, None]
+    split_mesh = Topology(
         vertex_count,
         faces.reshape(-1),
-        np.arange(0, faces.size + 1, TRIANGLE, dtype=np.int32),
-        NO_FACES,
+        offsets,
+        np.repeat(np.arange(len(faces), dtype=np.uint32), QUAD) if quads else NO_FACES,
         edges,
-        face_edges.reshape(-1),
+        corner_edges.reshape(-1),
         half_edges,
         edge_class,
-        child_soft,
-        worn,
+        soft,
         plain=True,
-        soft_corners=soft_corners,
+        **vertices,
     )
-    return made.worn(parent, halves, inherit=inherit)
-
-
-def inheriting(made: Topology, parent: Topology) -> Topology:
-    """Return the topology of a split in which the halves of edges have their sharpness."""
-    made = made.with_creases(made.rows_of(halves_of(parent, parent.crease_edges)))
-    if len(parent.soft):
-        rows = np.flatnonzero(parent.soft)
-        sharpness = np.zeros(len(made.edges))
-        sharpness[made.rows_of(halves_of(parent, rows))] = np.repeat(parent.soft[rows], 2)
-        made = made.with_sharpness(sharpness)
-    return made
+    return split_mesh.worn(parent, halves, inherit=inherit)
 
 
 def split_faces(
     parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
 ) -> Integer[np.ndarray, "C 3"]:
     """Return the triangles of the 1-to-4 split, in the order of ``split_triangles``."""
-    faces = np.empty((4 * parent.face_count, TRIANGLE), dtype=dtype)
-    read = parent.faces, parent.face_edges, parent.vertex_count
-    blocks.run(parent.face_count, lambda begin, end: kernels.split_faces(*read, begin, end, faces))
+    faces = np.empty((4 * len(parent.faces), TRIANGLE), dtype=dtype)
+    blocks.run(parent.face_count, split.split_triangles, parent.connectivity, faces)
+    return faces
+
+
+def split_quads(parent: Topology, blocks: Blocks, *, inherit: bool = True) -> Topology:
+    """Return the topology of the split of faces of any degree into a quad for each corner.
+
+    The vertex of edge e is V + e, that of face f is V + E + f. The quad of corner h is (its vertex,
+    the vertex of the edge that leaves it, the face's vertex, that of the edge that enters it), and
+    it is face h of the refined mesh. Arguments are as of ``split_triangles``.
+    """
+    return split_into(quad_faces(parent, blocks), parent, blocks, inherit=inherit)
+
+
+def quad_faces(
+    parent: Topology, blocks: Blocks, dtype: type[np.uint32] | type[np.int64] = np.uint32
+) -> Integer[np.ndarray, "H 4"]:
+    """Return the quads of the split, in the order of ``split_quads``."""
+    faces = np.empty((len(parent.corners), QUAD), dtype=dtype)
+    blocks.run(parent.face_count, split.split_into_quads, parent.connectivity, faces)
     return faces
 
 
@@ -576,10 +580,7 @@ Numbered = tuple[
 
 
 def _number_edges(
-    corners: UInt32[np.ndarray, " H"],
-    offsets: Integer[np.ndarray, " F1"],
-    vertex_count: int,
-    blocks: Blocks,
+    corners: UInt32[np.ndarray, " H"], offsets: Integer[np.ndarray, " F1"], vertex_count: int
 ) -> Numbered:
     """Return edges, their half-edges, the edge of each corner, and whether triangles are plain."""
     count = len(corners)
@@ -591,10 +592,9 @@ def _number_edges(
     )
     if made == kernels.TOO_LONG:
         return _sort_edges(corners, offsets, vertex_count)
-    edges, half_edges = np.empty((made, 2), np.uint32), np.empty((made, 2), np.int32)
-    blocks.quiet().run(
-        made, lambda begin, end: kernels.read_links(low, links, begin, end, edges, half_edges)
-    )
+    edges, links = np.empty((made, 2), np.uint32), links[:made]
+    edges[:, 0], edges[:, 1] = low[:made], links[:, kernels.HIGH]
+    half_edges = np.ascontiguousarray(links[:, kernels.FIRST :])
     return edges, half_edges, corner_edges, bool(plain[0])
 
 

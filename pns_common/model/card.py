@@ -97,24 +97,10 @@ class ModelCard:
         return card
 
 
+_OPTIONAL = frozenset(field.name for field in fields(ModelCard) if field.default is None)
 # Beside the fields without a default: what a card of a format has.
 NEEDED: Mapping[int, frozenset[str]] = MappingProxyType(
-    {
-        PAPER_FORMAT: frozenset(),
-        DIRECTED_FORMAT: frozenset(
-            {
-                "base",
-                "vertex_gate_sharpness",
-                "boundary_strength",
-                "network_scale",
-                "fold_angle",
-                "sharpness_levels",
-                "width",
-                "hidden",
-                "rounds",
-            }
-        ),
-    }
+    {PAPER_FORMAT: frozenset[str](), DIRECTED_FORMAT: _OPTIONAL}
 )
 
 Range = tuple[Callable[[Any], bool], str]
@@ -213,8 +199,7 @@ def _check_fields_of_format(card: ModelCard) -> None:
     """Check that the fields of its format stand there and no others. Raises ValueError."""
     given = {field.name for field in fields(card) if getattr(card, field.name) is not None}
     needed = NEEDED[card.format]
-    optional = {field.name for field in fields(card) if field.default is None}
-    for name in sorted(given & optional - needed):
+    for name in sorted(given & _OPTIONAL - needed):
         raise ValueError(f"unknown field {name} in format {card.format}")
     for name in sorted(needed - given):
         raise ValueError(f"missing field {name} in format {card.format}")

@@ -24,7 +24,15 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 from pns_common.errors import ModelError, ParameterError
 from pns_common.model.card import CARD_KEY, DIRECTED_FORMAT, ModelCard
-from pns_common.model.session import CHUNK_ROWS, CPU, Model, Network, OnnxModel, networks
+from pns_common.model.session import (
+    CHUNK_ROWS,
+    CPU,
+    Model,
+    Network,
+    OnnxModel,
+    first_line,
+    networks,
+)
 
 if TYPE_CHECKING:
     from onnx import ModelProto, NodeProto, ValueInfoProto
@@ -244,7 +252,7 @@ def _check_valid(proto: ModelProto, name: str) -> None:
     try:
         checker.check_model(proto)
     except (ValueError, onnx.checker.ValidationError) as error:
-        raise ModelError(name, expected="a valid ONNX model", found=_reason(error)) from error
+        raise ModelError(name, expected="a valid ONNX model", found=first_line(error)) from error
 
 
 def _check_signatures(
@@ -324,7 +332,7 @@ def _inferred(proto: ModelProto, network: Network, name: str) -> Iterator[ValueI
         inferred = inference.infer_shapes(asked, check_type=True, strict_mode=True).graph
     except (ValueError, inference.InferenceError) as error:
         expected = "shapes that fit together"
-        raise ModelError(name, expected=expected, found=_reason(error)) from error
+        raise ModelError(name, expected=expected, found=first_line(error)) from error
     yield from inferred.value_info
     yield from inferred.output
 
@@ -340,7 +348,3 @@ def _bytes(value: ValueInfoProto) -> int | None:
     if min(sizes, default=0) < 0:
         return None
     return math.prod(sizes) * helper.tensor_dtype_to_np_dtype(tensor.elem_type).itemsize
-
-
-def _reason(error: Exception) -> str:
-    return [*str(error).splitlines(), type(error).__name__][0]

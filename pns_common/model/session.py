@@ -210,7 +210,7 @@ class OnnxModel:
             (answer,) = session.run([output], inputs)
         except Exception as error:  # onnxruntime's errors share no base below Exception
             raise ModelError(
-                self.name, expected="a graph that runs to its end", found=_first_line(error)
+                self.name, expected="a graph that runs to its end", found=first_line(error)
             ) from error
         return np.asarray(answer)
 
@@ -247,9 +247,10 @@ def _open_session(data: bytes, name: str, providers: Sequence[str]) -> Any:
         return runtime.InferenceSession(data, options, providers=list(providers))
     except Exception as error:  # onnxruntime's errors share no base below Exception
         raise ModelError(
-            name, expected="a graph that onnxruntime runs", found=_first_line(error)
+            name, expected="a graph that onnxruntime runs", found=first_line(error)
         ) from error
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """Return the first line of an error's text, or its class without any."""
     return [*str(error).splitlines(), type(error).__name__][0]

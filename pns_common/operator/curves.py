@@ -64,17 +64,15 @@ def find_curves(
     count, kinds, sharp = mesh.vertex_count, mesh.edge_class, mesh.sharpest
     edge_count = len(mesh.edges)
     shared = np.zeros(row_count or count + edge_count, dtype=bool)
-    movable = np.zeros(count, dtype=bool)
-    if sharp is None:
-        rows, pairs, none = np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 3))
-        nothing = np.zeros(0)
-        return Curves(movable, rows, pairs, none, none, pairs, rows, nothing, nothing, shared)
-    share = sharp.weights[:, 1] - sharp.weights[:, 2]
+    weights, neighbours = np.zeros((count, 3)), np.zeros((count, 2), dtype=np.int64)
+    if sharp is not None:
+        weights, neighbours = sharp.weights, sharp.neighbours
+    share = weights[:, 1] - weights[:, 2]
     irregular = kinds == connectivity.IRREGULAR
     movable = share > 0
     movable[mesh.edges[irregular].reshape(-1)] = False
     rows = np.flatnonzero(movable)
-    sides = sharp.neighbours[rows]
+    sides = neighbours[rows]
     a, b = (points[sides[:, side]] - points[rows] for side in (0, 1))
     edges = np.flatnonzero((mesh.sharpness > 0) & ~irregular)
     ends = mesh.edges[edges]
@@ -83,7 +81,7 @@ def find_curves(
     along = points[ends[:, 1]] - points[ends[:, 0]]
     on_boundary = kinds == connectivity.BOUNDARY
     if on_boundary.any():
-        alone = sharp.weights[:, 2] == mesh.corner_weights
+        alone = weights[:, 2] == mesh.corner_weights
         of_boundary = np.bincount(mesh.edges[on_boundary].reshape(-1), minlength=count)
         shared[:count] = movable & alone & (of_boundary == TWO)
         shared[count : count + edge_count] = on_boundary

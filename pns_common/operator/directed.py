@@ -77,23 +77,8 @@ def directed_features(
     """
     mesh, rings = level.topology, level.rings
     made = np.empty((2 * (end - begin), kernels.FEATURES), dtype=feature_type)
-    kernels.directed_features(
-        level.points,
-        level.normals,
-        rings.fields,
-        rings.means,
-        level.logs,
-        _sizes(level),
-        mesh.corners,
-        mesh.offsets,
-        mesh.face_of_corner,
-        mesh.edges,
-        mesh.half_edges,
-        mesh.edge_class,
-        begin,
-        end,
-        made,
-    )
+    measured = level.points, level.normals, rings.fields, rings.means, level.logs, _sizes(level)
+    kernels.directed_features(begin, end, *measured, mesh.connectivity, made)
     return made
 
 
@@ -101,17 +86,11 @@ def _sizes(level: Level) -> Float[np.ndarray, "V 3"]:
     """Return the columns of ``kernels.measure_sizes``, made once."""
     kept = vars(level)
     if "sizes" not in kept:
-        made, rings, counts = (
-            np.empty((len(level.points), 3)),
-            level.rings,
-            level.topology.sharp_count,
-        )
-        on_border = counts > 0 if len(counts) else np.zeros(len(made), dtype=bool)
-        read = rings.means, rings.valence, on_border
-        level.blocks.quiet().run(
-            len(made), lambda begin, end: kernels.measure_sizes(*read, begin, end, made)
-        )
-        kept["sizes"] = made
+        sizes, counts = np.empty((len(level.points), 3)), level.topology.sharp_count
+        on_boundary = counts > 0 if len(counts) else np.zeros(len(sizes), dtype=bool)
+        read = level.rings.means, level.rings.valence, on_boundary
+        level.blocks.quiet().run(len(sizes), kernels.measure_sizes, *read, sizes)
+        kept["sizes"] = sizes
     return kept["sizes"]
 
 
@@ -143,29 +122,22 @@ def ask(level: Level, networks: DirectedNetworks) -> Answers:
     asked, of_leaving = np.empty((count, 3)), np.empty((2 * count, 3))
     logits, corner_logits = np.empty(count), np.empty(2 * count)
     heights = np.empty(2 * count if networks.answers > kernels.FACE else 0)
-    geometry = level.points, level.normals, level.rings.fields, mesh.corners, mesh.face_of_corner
-    of_edges = edges, mesh.half_edges, mesh.edge_class
+    geometry = level.points, level.normals, level.rings.fields, mesh.connectivity
 
     def answer(begin: int, end: int) -> None:
         rows = slice(2 * begin, 2 * end)
         heads = checked_answers(networks.heads, states[rows], networks.answers).astype(np.float64)
-        kernels.read_heads(*geometry, *of_edges, heads, begin, end, asked, of_leaving, logits)
+        kernels.read_heads(begin, end, *geometry, heads, asked, of_leaving, logits)
         for own, column in (corner_logits, kernels.CORNER), (heights, kernels.FACE):
             if len(own):
                 own[rows] = heads[:, column]
 
     level.blocks.of_rows(EDGES_AT_ONCE).run(count, answer)
+    blocks, faces = level.blocks.quiet(), np.empty(mesh.face_count if len(heights) else 0)
     of_vertices, vertex_logits = np.empty(level.points.shape), np.empty(mesh.vertex_count)
     read = of_leaving, corner_logits, starts, leaving
-    level.blocks.quiet().run(
-        mesh.vertex_count,
-        lambda begin, end: kernels.mean_leaving(*read, begin, end, of_vertices, vertex_logits),
-    )
-    faces = np.empty(mesh.face_count if len(heights) else 0)
-    around = heights, mesh.offsets, mesh.corner_edges
-    level.blocks.quiet().run(
-        len(faces), lambda begin, end: kernels.mean_in_faces(*around, begin, end, faces)
-    )
+    blocks.run(mesh.vertex_count, kernels.mean_leaving, *read, of_vertices, vertex_logits)
+    blocks.run(len(faces), kernels.mean_in_faces, heights, mesh.connectivity, faces)
     return Answers(asked, of_vertices, faces, _sigmoid(logits), _sigmoid(vertex_logits))
 
 
@@ -187,12 +159,12 @@ def _states(
 
     def tell(network: Network, begin: int, end: int) -> None:
         pooled = np.empty((end - begin, 2 * width), dtype=kind)
-        kernels.pool(states, starts, leaving, begin, end, np.empty(width), pooled)
+        kernels.pool(begin, end, states, starts, leaving, np.empty(width), pooled)
         told[begin:end] = checked_answers(network, pooled, told.shape[1])
 
     def hear(update: Network, begin: int, end: int) -> None:
         messages = np.empty((2 * (end - begin), 2 * width + networks.hidden), dtype=kind)
-        kernels.gather(states, told, edges, begin, end, messages)
+        kernels.gather(begin, end, states, told, edges, messages)
         # Both ways of an edge stand in one block: nobody else reads these rows any more.
         states[2 * begin : 2 * end] += checked_answers(update, messages, width)
 

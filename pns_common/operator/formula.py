@@ -37,7 +37,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.errors import ParameterError
-from pns_common.kernels import children, correction, directed, frames, measures, quads
+from pns_common.kernels import children, correction, directed, frames, measures
 from pns_common.mesh.topology import Topology
 from pns_common.model.features import FeatureSet
 from pns_common.operator.curves import Curves, curve_prior, curve_pushes, find_curves
@@ -49,35 +49,6 @@ NETWORK_ROWS = 4096
 # After so many halvings s becomes 0.
 ROUNDS = 30
 EVERYWHERE, NONE_SHARED = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-
-
-@dataclass(frozen=True)
-class PaperRule:
-    """The network and the numbers of the paper's rule; symbols as at the top of this file.
-
-    Attributes:
-        network: φ → η, at unit budget.
-        seen: the features φ of edges.
-        symmetric: c lies to the left of a → b, so no numbering matters; else in the lower face.
-        gate_sharpness: c.
-        budget: C.
-        feature_type: the floating type in which the network reads φ.
-    """
-
-    network: Network
-    seen: FeatureSet
-    symmetric: bool
-    gate_sharpness: float
-    budget: float
-    feature_type: type[np.floating[Any]] = np.float64
-
-    def __call__(self, level: Level) -> Additions:
-        """Apply the rule at a level.
-
-        Raises:
-            ModelError: an answer of the network is not finite, or has another shape.
-        """
-        return paper_level(level, self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +78,9 @@ class Additions:
     scale: Float[np.ndarray, " W"] | None
 
 
+# --- the paper's rule ----------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, eq=False)
 class Inputs:
     """All that surrounds the paper's network at N interior edges.
@@ -128,27 +102,48 @@ class Inputs:
     degenerate: Bool[np.ndarray, " N"]
 
 
-def paper_level(level: Level, rule: PaperRule) -> Additions:
-    """Apply the paper's rule at a level.
+@dataclass(frozen=True)
+class PaperRule:
+    """The network and the numbers of the paper's rule; symbols as at the top of this file.
 
-    Raises:
-        ModelError: an answer of the network is not finite, or has another shape.
+    Attributes:
+        network: φ → η, at unit budget.
+        seen: the features φ of edges.
+        symmetric: c lies to the left of a → b, so no numbering matters; else in the lower face.
+        gate_sharpness: c.
+        budget: C.
+        feature_type: the floating type in which the network reads φ.
     """
-    mesh, blocks, count = level.topology, level.blocks.of_rows(NETWORK_ROWS), len(level.points)
-    x = level.base.place(level.points, mesh, level.blocks)  # x0
-    level.measure(rings=rule.seen.rings)
-    made = _Rows.starting_with(np.zeros((len(x), 3)))
 
-    def correct(begin: int, end: int) -> int:
-        at = edge_inputs(level, rule, mesh.interior[begin:end])
-        read = at.rows, count, 0, len(at.rows), answers(rule.network, at), at.basis
-        correction.correct_by_equation_1(*read, at.gate, at.bound, *made.arrays)
-        return int(at.degenerate.sum())
+    network: Network
+    seen: FeatureSet
+    symmetric: bool
+    gate_sharpness: float
+    budget: float
+    feature_type: type[np.floating[Any]] = np.float64
 
-    degenerate: int = sum(blocks.run(len(mesh.interior), correct))
-    base_points = x.copy()
-    x += made.displacement
-    return Additions(x, base_points, *made.arrays, None, degenerate, None)
+    def __call__(self, level: Level) -> Additions:
+        """Apply the rule at a level.
+
+        Raises:
+            ModelError: an answer of the network is not finite, or has another shape.
+        """
+        mesh, count = level.topology, len(level.points)
+        x = level.base.place(level.points, mesh, level.blocks)  # x0
+        level.measure(rings=self.seen.rings)
+        delta, (ratio, gate, bound) = np.zeros((len(x), 3)), np.zeros((3, len(x)))
+
+        def correct(begin: int, end: int) -> int:
+            at = edge_inputs(level, self, mesh.interior[begin:end])
+            read = at.rows, count, answers(self.network, at), at.basis, at.gate, at.bound
+            correction.correct_by_equation_1(*read, delta, ratio, gate, bound)
+            return int(at.degenerate.sum())
+
+        blocks = level.blocks.of_rows(NETWORK_ROWS)
+        degenerate = sum(blocks.run(len(mesh.interior), correct))
+        base_points = x.copy()
+        x += delta
+        return Additions(x, base_points, delta, ratio, gate, bound, None, degenerate, None)
 
 
 def edge_inputs(level: Level, rule: PaperRule, rows: Integer[np.ndarray, " N"]) -> Inputs:
@@ -160,8 +155,8 @@ def edge_inputs(level: Level, rule: PaperRule, rows: Integer[np.ndarray, " N"]) 
     fields = level.rings.fields if seen.rings else np.zeros((0, measures.FIELDS))
     frames.frames_and_features(
         *(level.points, level.normals, fields, level.edges.lengths, level.logs),
-        *(mesh.corners, mesh.edges, mesh.corner_edges, mesh.half_edges, rows, 0, count),
-        *(rule.symmetric, seen.starts, basis, curvature, length, degenerate, features),
+        *(mesh.connectivity, rows, rule.symmetric, seen.starts),
+        *(basis, curvature, length, degenerate, features),
     )
     gate = np.tanh(rule.gate_sharpness * curvature**2)
     bound = rule.budget / _unit_length(level) * (length * length)
@@ -212,7 +207,32 @@ class DirectedRule:
         Raises:
             ModelError: an answer of a network is not finite, or has another shape.
         """
-        return directed_level(level, self)
+        mesh, count = level.topology, len(level.points)
+        x = level.base.place(level.points, mesh, level.blocks)  # x0
+        said, around = answers_of(level, self.networks), surroundings(level, self, x)
+        delta, (ratio, gate, bound) = around.flat, np.zeros((3, len(x)))  # D, to become δ
+        asked = said.vertices, said.edges, said.faces[:, None] * level.normals[: len(said.faces)]
+        firsts = 0, count, count + len(mesh.edges)
+        for u, first, rows, open_, longest, h in zip(
+            asked, firsts, around.rows, around.gates, around.bounds, around.lengths, strict=True
+        ):
+            read = rows, first, u, self.network_scale * h, open_, longest
+            to = delta, ratio, gate, bound
+            level.blocks.run(len(rows), correction.correct_from_flat, *read, *to)
+        curves = find_curves(level.points, mesh.without_soft(), len(x))
+        if len(curves.new_rows):
+            pushes = self.curve_strength * curve_pushes(curves, self.vertex_gate_sharpness)
+            longest = self.budget / _unit_length(level) * curves.squares
+            read = curves.new_rows, curves.shares, curve_prior(curves, pushes), longest
+            correction.add_on_curves(*read, delta, ratio, bound)
+        scale = guard_scale(level, x, delta, math.radians(self.fold_angle), curves)
+        if (scale < 1).any():
+            delta *= scale[:, None]
+            ratio *= scale
+        x += delta
+        frameless = int(np.count_nonzero(level.unmarked.edges.lengths[mesh.interior] == 0))
+        movable = level.ringed | curves.movable
+        return Additions(x, None, delta, ratio, gate, bound, movable, frameless, scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,47 +252,13 @@ class Surroundings:
     rows: tuple[Integer[np.ndarray, " _"], ...]
 
 
-def directed_level(level: Level, rule: DirectedRule) -> Additions:
-    """Apply a rule of directed edges at a level.
-
-    Raises:
-        ModelError: a network's answer is not finite, or has another shape.
-    """
-    mesh, base, count = level.topology, level.base, len(level.points)
-    x = base.place(level.points, mesh, level.blocks)  # x0
-    said, around = answers_of(level, rule.networks), surroundings(level, rule, x)
-    delta = around.flat  # D, to become δ
-    made = _Rows.starting_with(delta)
-    asked = said.vertices, said.edges, along_normals(level, said.faces)
-    firsts = 0, count, count + len(mesh.edges)
-    for u, first, rows, gate, bound, h in zip(
-        asked, firsts, around.rows, around.gates, around.bounds, around.lengths, strict=True
-    ):
-        read = rows, first, u, rule.network_scale * h, gate, bound
-
-        def correct(begin: int, end: int, read: Any = read) -> None:
-            correction.correct_from_flat(*read[:2], begin, end, *read[2:], *made.arrays)
-
-        level.blocks.run(len(rows), correct)
-    curves = find_curves(level.points, mesh.without_soft(), len(x))
-    if len(curves.new_rows):
-        along = rule.curve_strength * curve_pushes(curves, rule.vertex_gate_sharpness)
-        made.add_on_curves(curves, curve_prior(curves, along), rule.budget / _unit_length(level))
-    scale = guard_scale(level, x, delta, math.radians(rule.fold_angle), curves)
-    made.scale(scale)
-    x += delta
-    frameless = int(np.count_nonzero(level.unmarked.edges.lengths[mesh.interior] == 0))
-    movable = level.ringed | curves.movable
-    return Additions(x, None, *made.arrays, movable, frameless, scale)
-
-
 def surroundings(
     level: Level, rule: DirectedRule, base_points: Float[np.ndarray, "W 3"]
 ) -> Surroundings:
     """Return what surrounds the network's answers; ``base_points`` are x0."""
     mesh, seen, points = level.topology, level.unmarked, level.points
     flat = np.empty_like(base_points)
-    correction.place_flat(points, mesh.edges, mesh.edge_class, level.ringed, base_points, flat)
+    correction.place_flat(points, mesh.connectivity, level.ringed, base_points, flat)
     lengths, squares = seen.edges.lengths, seen.rings.means[:, measures.SQUARE]
     faces, of_faces = np.arange(mesh.face_count if level.base.polygons else 0), np.zeros(0)
     if len(faces):
@@ -320,14 +306,8 @@ def spread_gates(
     """Return what ``kernels.directed.spread_gates`` makes of the gates of edges."""
     opened, at_vertices = np.zeros(mesh.face_count), np.zeros(mesh.vertex_count)
     most, least = np.zeros(len(mesh.edges)), np.ones(len(mesh.edges))
-    of_mesh = mesh.corners, mesh.offsets, mesh.corner_edges
-    directed.spread_gates(*of_mesh, of_edges, opened, at_vertices, most, least)
+    directed.spread_gates(mesh.connectivity, of_edges, opened, at_vertices, most, least)
     return opened, at_vertices, most, least
-
-
-def along_normals(level: Level, heights: Float[np.ndarray, " F"]) -> Float[np.ndarray, "F 3"]:
-    """Return so long vectors along the normals of faces."""
-    return heights[:, None] * level.normals[: len(heights)]
 
 
 def _unit_length(level: Level) -> float:
@@ -358,64 +338,16 @@ def guard_scale(
     It bounds the turns between neighbours too. With normals n, n' of two children and m, m' of
     their counterparts, ∠(n, n') ≤ ∠(n, m) + ∠(m, m') + ∠(m', n') ≤ ∠(m, m') + 2 ``angle``.
     """
-    mesh = level.topology
+    faces, cosine = level.base.faces(level.topology, level.blocks.quiet()), math.cos(angle)
     scale, changed = np.ones(len(delta)), EVERYWHERE
     shared = curves.shared if curves.shared.any() else NONE_SHARED
-    blocks = level.blocks.quiet()
-    mark = quads.mark_folds if level.base.polygons else children.mark_folds
-    of_mesh = (
-        mesh.corners,
-        mesh.offsets,
-        mesh.corner_edges,
-        mesh.vertex_count,
-        mesh.vertex_count + len(mesh.edges),
-    )
-    if not level.base.polygons:
-        of_mesh = mesh.faces, mesh.face_edges, mesh.vertex_count
     for rounds in rounds_from_0():
         touched = np.zeros(len(delta), dtype=bool)
-        read = base_points, delta, scale, shared, changed, math.cos(angle)
-        blocks.run(
-            mesh.face_count,
-            lambda begin, end: mark(*read, *of_mesh, begin, end, touched),  # noqa: B023
-        )
+        read = faces, base_points, delta, scale, shared, changed, cosine
+        level.blocks.quiet().run(len(faces), children.mark_folds, *read, touched)
         rows = np.flatnonzero(touched)
         if len(rows) == 0:
             return scale
         scale[rows] = scale[rows] / 2 if rounds < ROUNDS else 0.0
         changed = touched
     raise AssertionError("a round without folds ends the loop")
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Output arrays of a level: δ (at first D), ‖δ‖ / ρ, γ, ρ of every new vertex."""
-
-    displacement: Float[np.ndarray, "W 3"]
-    ratio: Float[np.ndarray, " W"]
-    gate: Float[np.ndarray, " W"]
-    bound: Float[np.ndarray, " W"]
-
-    @classmethod
-    def starting_with(cls, prior: Float[np.ndarray, "W 3"]) -> _Rows:
-        """Return rows with D, and zeros in the other arrays."""
-        return cls(prior, *np.zeros((3, len(prior))))
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """All four, in the order of the kernels."""
-        return self.displacement, self.ratio, self.gate, self.bound
-
-    def add_on_curves(
-        self, curves: Curves, along: Float[np.ndarray, "M 3"], budget_per_length: float
-    ) -> None:
-        """Add Π_ρ(D) along curves, by the share of each new vertex on one."""
-        bound = budget_per_length * curves.squares
-        read = curves.new_rows, curves.shares, along, bound
-        correction.add_on_curves(*read, self.displacement, self.ratio, self.bound)
-
-    def scale(self, by: Float[np.ndarray, " W"]) -> None:
-        """Put s δ in place of δ."""
-        if (by < 1).any():
-            self.displacement[:] *= by[:, None]
-            self.ratio[:] *= by

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.kernels import connectivity, measures
+from pns_common.kernels import measures
 from pns_common.kernels.frames import SHORTEST
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.normals import NO_AREAS, measure_faces
@@ -99,10 +99,8 @@ class Level:
         """Lengths and turns of the edges."""
         mesh, count = self.topology, len(self.topology.edges)
         made = EdgeMeasures(np.empty(count), np.empty(count))
-        of_corners = mesh.corners, mesh.face_of_corner
-        read = self.points, self.normals, *of_corners, mesh.edges, mesh.half_edges, mesh.edge_class
-        to = made.lengths, made.jumps
-        self.blocks.run(count, lambda begin, end: measures.measure_edges(*read, begin, end, *to))
+        read = self.points, self.normals, mesh.connectivity
+        self.blocks.run(count, measures.measure_edges, *read, made.lengths, made.jumps)
         return made
 
     @cached_property
@@ -122,12 +120,12 @@ class Level:
         mesh, count, owners = self.topology, len(self.points), self.blocks.owners(len(self.points))
         fields, means = np.empty((count, measures.FIELDS)), np.empty((count, measures.MEANS))
         valence = np.empty(count, dtype=np.int32)
-        spokes = self.points, mesh.edges, mesh.edge_reach
-        at_faces = mesh.corners, mesh.face_of_corner, mesh.corner_reach, self.faces[1]
+        at_faces = mesh.connectivity, mesh.corner_reach, self.faces[1]
+        spokes = self.points, mesh.edges, mesh.edge_reach, mesh.sharp_count
 
         def around(begin: int, end: int) -> None:
-            measures.mean_normals(*at_faces, begin, end, fields)
-            measures.mean_spokes(*spokes, mesh.sharp_count, begin, end, means, valence, fields)
+            measures.mean_normals(begin, end, *at_faces, fields)
+            measures.mean_spokes(begin, end, *spokes, means, valence, fields)
 
         owners.run(count, around)
         # Nothing else reads the areas: an eighth of all memory.
@@ -141,9 +139,8 @@ class Level:
         The end of one crease, a dart, is among them; a vertex on a boundary is not.
         """
         mesh = self.topology
-        ringed = mesh.count_fans(self.blocks.quiet()) == 1
+        ringed = mesh.fan_count == 1
         if len(mesh.sharp_count):
-            creases = np.zeros(mesh.vertex_count, dtype=np.int32)
-            connectivity.count_ends(mesh.edges, mesh.crease_edges, creases)
+            creases = mesh.count_ends(mesh.crease_edges)
             ringed &= (mesh.sharp_count == 0) | ((mesh.sharp_count == 1) & (creases == 1))
         return ringed

@@ -55,10 +55,10 @@ def shares_of_edges(level: Level, rule: DirectedRule) -> Float[np.ndarray, " E"]
 
 
 def shares_of_corners(level: Level, rule: DirectedRule) -> Float[np.ndarray, " V"]:
-    """Return κ of each vertex: the network's inside, 0 on planes; on a border the border's own.
+    """Return κ of each vertex: inside the network's, 0 on planes; on a boundary its own.
 
-    Where a border turns by 45 to 75 degrees κ grows from 0 to 1, whatever lies inside, so that
-    pieces that share a border keep the same corners.
+    Where a boundary turns by 45 to 75 degrees κ grows from 0 to 1, whatever lies inside, so that
+    pieces that share a boundary keep the same corners.
     """
     answers, seen = answers_of(level, rule.networks), level.unmarked
     mesh = seen.topology

@@ -9,11 +9,15 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.mesh.sectors import LimitNormals
+from pns_common.kernels import loop as kernels
 from pns_common.mesh.topology import Topology, split_faces
 from pns_common.parallel import Blocks
+from pns_common.schemes.sector_masks import LimitNormals
 
 WIDTH = 3
+# Weights of a vertex on a sharp curve and of either neighbour along it, at each level and for ever.
+CURVE = kernels.CURVE_CENTRE, kernels.CURVE_NEIGHBOUR
+CURVE_LIMIT = 2 / 3, 1 / 6
 Place = Callable[[Float[np.ndarray, "V K"], Topology, Blocks], Float[np.ndarray, "W K"]]
 
 
@@ -33,18 +37,11 @@ class Limit:
     Attributes:
         positions: returns the limits of three columns of a mesh's vertices.
         normals: returns the normals of the limit surface there.
-        ring_weight: of a smooth vertex of valence k, the weight of its neighbours' mean where the
-            limit is made of that and the vertex alone; None: it is not.
     """
 
-    positions: Callable[[Float[np.ndarray, "V 3"], Topology, Blocks], Float[np.ndarray, "V 3"]] = (
-        field(repr=False)
-    )
+    positions: Place = field(repr=False)
     normals: Callable[[Float[np.ndarray, "V 3"], Topology, Blocks], LimitNormals] = field(
         repr=False
-    )
-    ring_weight: Callable[[Integer[np.ndarray, " N"]], Float[np.ndarray, " N"]] | None = field(
-        default=None, repr=False
     )
 
 
@@ -68,6 +65,22 @@ class BaseScheme:
     faces: Callable[..., Integer[np.ndarray, "C N"]] = field(default=split_faces, repr=False)
     polygons: bool = field(default=False, repr=False)
     limit: Limit | None = field(default=None, repr=False)
+
+
+def follow_curves(
+    points: Float[np.ndarray, "V 3"],
+    topology: Topology,
+    curve: tuple[float, float],
+    placed: Float[np.ndarray, "V 3"],
+) -> None:
+    """Move vertices on sharp and soft edges, in place, from where the smooth rule put them.
+
+    ``curve``: weights of a vertex and of either neighbour along a curve.
+    """
+    sharp = topology.sharpest
+    if sharp is not None:
+        read = sharp.rows, sharp.weights, sharp.neighbours
+        kernels.blend_sharp(points, *read, *curve, placed)
 
 
 def in_threes(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pns_common.mesh.quads import quad_faces, split_quads
+from pns_common.mesh.topology import quad_faces, split_quads
 from pns_common.schemes.base_scheme import BaseScheme, Limit
 from pns_common.schemes.catmull_clark_limit import limit_normals, limit_positions
 from pns_common.schemes.catmull_clark_masks import place

@@ -37,25 +37,23 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
-from pns_common.kernels import loop
-from pns_common.mesh.sectors import (
+from pns_common.mesh.rows import ranges
+from pns_common.mesh.sectors import find_sectors
+from pns_common.mesh.topology import NO_WEIGHTS, Topology
+from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
+from pns_common.schemes.catmull_clark_masks import place
+from pns_common.schemes.sector_masks import (
     CLOSED,
-    CORNER,
     CURVE,
     DART,
     LimitNormals,
-    find_sectors,
     mask_tables,
-    normals_of_sectors,
-    sector_kinds,
-    walked_arrays,
+    sector_normals,
 )
-from pns_common.mesh.topology import NO_WEIGHTS, Topology
-from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH
-from pns_common.schemes.catmull_clark_masks import place
 
-CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
+# A neighbour's weight, in units of an opposite corner's.
+EDGE = 4
 # Of a dart's smooth neighbours: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 4.0, (7 - 45**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -72,27 +70,24 @@ def limit_positions(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
-    mesh, count, sharp = topology, topology.vertex_count, topology.sharpest
+    mesh, count = topology, topology.vertex_count
     none = dict.fromkeys(("soft", "vertex_sharpness", "soft_corners"), NO_WEIGHTS)
     smooth = replace(mesh, **none)
-    placed = place(points, smooth, blocks)
-    read = mesh.corners, mesh.offsets, mesh.face_of_corner, mesh.corner_edges, mesh.corner_reach
-    sums, edge_count = np.empty((count, WIDTH + 1)), len(mesh.edges)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: kernels.sum_limit_corners(placed, *read, edge_count, begin, end, sums),
-    )
-    limits = sums[:, :WIDTH].copy()
-    if sharp is None:
-        return limits
+    placed, edge_count = place(points, smooth, blocks), len(mesh.edges)
+    vertices, edges, faces = np.split(placed, [count, count + edge_count])
+    sums, counts = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
+    around = edges, faces, mesh.connectivity, mesh.corner_reach, True, EDGE / 2
+    blocks.owners(count).run(count, kernels.sum_corners, *around, sums, counts)
+    k = counts[:, None].astype(np.float64)
+    limits = (k * k * vertices + sums) / np.maximum(k * (k + 5), 1)
+    few = counts < kernels.LEAST_CORNERS
+    limits[few] = vertices[few]
     # Without an edge of sharpness 1 nothing is counted.
     darts = np.flatnonzero(mesh.sharp_count == DART)
-    darts = darts[sums[darts, WIDTH] >= kernels.LEAST_CORNERS]
+    darts = darts[~few[darts]]
     if len(darts):
-        weight = sums[:, WIDTH] ** 2
-        limits[darts] = _dart_limits(placed, weight, mesh)[darts]
-    curve = CURVE_CENTRE, CURVE_NEIGHBOUR
-    loop.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, limits)
+        limits[darts] = _dart_limits(placed, k[:, 0] ** 2, mesh)[darts]
+    follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
 
@@ -100,12 +95,19 @@ def _dart_limits(
     placed: Float[np.ndarray, "W 3"], weight: Float[np.ndarray, " V"], topology: Topology
 ) -> Float[np.ndarray, "V 3"]:
     """Return limits, right at vertices on exactly one sharp edge; ``weight`` is k²."""
-    around, count = find_sectors(topology), topology.vertex_count
+    around, count = find_sectors(topology.connectivity, quads=True), topology.vertex_count
     total, sums = weight.copy(), weight[:, None] * placed[:count]
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
-    at, weights = mask_tables(dart_weights, rows < around.opened, around.size[rows])
-    read = *walked_arrays(topology), len(topology.edges), around.first, around.size
-    kernels.sum_darts(placed, *read, at, weights, rows, sums, total)
+    size = around.size[rows]
+    at, tables = mask_tables(dart_weights, rows < around.opened, size)
+    p, at = np.repeat(around.vertex[rows], size), ranges(at, size, 2)
+    spokes = around.spokes[ranges(around.starts[rows], size, 2)[:, None] + np.arange(3)]
+    # e_j, d_j, and e_k at the last corner.
+    weights = tables[at[:, None] + np.arange(3)]
+    weights[np.delete(np.arange(len(at)), np.cumsum(size) - 1), 2] = 0.0
+    np.add.at(total, p, weights[:, 0] + weights[:, 1] + weights[:, 2])
+    e, d, last = (weights[:, k, None] * placed[spokes[:, k]] for k in range(3))
+    np.add.at(sums, p, e + d + last)
     return sums / np.maximum(total, 1)[:, None]
 
 
@@ -142,16 +144,8 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    placed, around = place(points, topology, blocks), find_sectors(topology)
-    kind = sector_kinds(topology, around)
-    at, masks = mask_tables(tangent_mask, kind, around.size)
-    sectors = np.empty((len(around.first), 3))
-    counts = topology.vertex_count, len(topology.edges)
-    read = *walked_arrays(topology), *counts, around.first, around.size, at, masks, kind == CORNER
-    blocks.run(
-        len(sectors), lambda begin, end: kernels.sector_normals(placed, *read, begin, end, sectors)
-    )
-    return normals_of_sectors(sectors, around, topology.vertex_count)
+    placed = place(points, topology, blocks)
+    return sector_normals(placed, topology, tangent_mask, blocks, quads=True)
 
 
 def tangent_mask(kind: int, k: int) -> Float[np.ndarray, "N 2"]:

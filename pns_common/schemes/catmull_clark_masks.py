@@ -20,10 +20,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.kernels import catmull_clark as kernels
-from pns_common.kernels import loop
+from pns_common.kernels.loop import MIDPOINT
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH, in_threes
+from pns_common.schemes.base_scheme import CURVE, WIDTH, follow_curves, in_threes
 
 
 def place(
@@ -40,28 +40,11 @@ def _place_three(
     mesh, count, edge_count = topology, topology.vertex_count, len(topology.edges)
     placed = np.empty((count + edge_count + mesh.face_count, WIDTH))
     vertices, at_edges, at_faces = np.split(placed, [count, count + edge_count])
-    faces = mesh.corners, mesh.offsets
-    blocks.run(
-        mesh.face_count,
-        lambda begin, end: kernels.place_faces(points, *faces, begin, end, at_faces),
-    )
-    read = mesh.edges, mesh.half_edges, mesh.face_of_corner, mesh.edge_class, mesh.soft
-    blocks.run(
-        edge_count,
-        lambda begin, end: kernels.place_edges(points, at_faces, *read, begin, end, at_edges),
-    )
-    around, counts = (*faces, mesh.face_of_corner, mesh.corner_reach), np.empty(count, np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: kernels.sum_corners(
-            points, at_faces, *around, begin, end, vertices, counts
-        ),
-    )
-    blocks.run(
-        count, lambda begin, end: kernels.blend_corners(points, counts, begin, end, vertices)
-    )
-    sharp = mesh.sharpest
-    if sharp is not None:
-        curve = loop.CURVE_CENTRE, loop.CURVE_NEIGHBOUR
-        loop.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, vertices)
+    read, counts = mesh.connectivity, np.empty(count, np.int32)
+    blocks.run(mesh.face_count, kernels.place_faces, points, read, at_faces)
+    blocks.run(edge_count, kernels.place_edges, points, at_faces, read, mesh.soft, at_edges)
+    around = points, at_faces, read, mesh.corner_reach, False, MIDPOINT
+    blocks.owners(count).run(count, kernels.sum_corners, *around, vertices, counts)
+    blocks.run(count, kernels.blend_corners, points, counts, vertices)
+    follow_curves(points, topology, CURVE, vertices)
     return placed

@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from pns_common.errors import ParameterError
-from pns_common.mesh.sectors import LimitNormals
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import BaseScheme, Limit, in_threes
 from pns_common.schemes.loop import LOOP
+from pns_common.schemes.sector_masks import LimitNormals
 
 
 def limit_positions(

@@ -26,9 +26,16 @@ from jaxtyping import Float
 from pns_common.kernels import loop as kernels
 from pns_common.mesh.topology import Topology, split_triangles
 from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH, BaseScheme, Limit, in_threes
+from pns_common.schemes.base_scheme import (
+    CURVE,
+    WIDTH,
+    BaseScheme,
+    Limit,
+    follow_curves,
+    in_threes,
+)
 from pns_common.schemes.loop_limit import limit_normals, limit_positions
-from pns_common.schemes.loop_weights import beta, limit_ring_weight
+from pns_common.schemes.loop_weights import beta
 
 KEPT = 64
 
@@ -46,27 +53,14 @@ def _place_three(
 ) -> Float[np.ndarray, "W 3"]:
     count, edge_count = topology.vertex_count, len(topology.edges)
     placed = np.empty((count + edge_count, WIDTH))
-    read = points, topology.corners, topology.edges, topology.half_edges, topology.edge_class
-    blocks.run(
-        edge_count,
-        lambda begin, end: kernels.place_edges(*read, topology.soft, begin, end, placed[count:]),
-    )
     vertices, valence = placed[:count], np.empty(count, dtype=np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: kernels.sum_rings(
-            points, topology.edges, topology.edge_reach, begin, end, vertices, valence
-        ),
-    )
+    read = points, topology.connectivity, topology.soft
+    blocks.run(edge_count, kernels.place_edges, *read, placed[count:])
+    ring = points, topology.edges, topology.edge_reach, vertices, valence
+    blocks.owners(count).run(count, kernels.sum_rings, *ring)
     weights = _beta_table(int(valence.max(initial=0)))
-    blocks.run(
-        count,
-        lambda begin, end: kernels.blend_rings(points, valence, weights, begin, end, vertices),
-    )
-    sharp = topology.sharpest
-    if sharp is not None:
-        curve = kernels.CURVE_CENTRE, kernels.CURVE_NEIGHBOUR
-        kernels.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, vertices)
+    blocks.run(count, kernels.blend_rings, points, valence, weights, vertices)
+    follow_curves(points, topology, CURVE, vertices)
     return placed
 
 
@@ -80,5 +74,5 @@ def _kept_betas() -> Float[np.ndarray, " K"]:
     return beta(np.arange(KEPT))
 
 
-LIMIT = Limit(limit_positions, limit_normals, limit_ring_weight)
+LIMIT = Limit(limit_positions, limit_normals)
 LOOP = BaseScheme("loop", place, split_triangles, limit=LIMIT)

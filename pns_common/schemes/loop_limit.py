@@ -36,26 +36,22 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.kernels import limit as kernels
 from pns_common.kernels import loop as masks
-from pns_common.mesh.sectors import (
+from pns_common.mesh.rows import ranges
+from pns_common.mesh.sectors import find_sectors
+from pns_common.mesh.topology import Topology
+from pns_common.parallel import Blocks
+from pns_common.schemes.base_scheme import CURVE_LIMIT, WIDTH, follow_curves
+from pns_common.schemes.loop_weights import beta, limit_ring_weight
+from pns_common.schemes.sector_masks import (
     CLOSED,
-    CORNER,
     CURVE,
     DART,
     LimitNormals,
-    find_sectors,
     mask_tables,
-    normals_of_sectors,
-    sector_kinds,
-    walked_arrays,
+    sector_normals,
 )
-from pns_common.mesh.topology import Topology
-from pns_common.parallel import Blocks
-from pns_common.schemes.base_scheme import WIDTH
-from pns_common.schemes.loop_weights import beta, limit_ring_weight
 
-CURVE_CENTRE, CURVE_NEIGHBOUR = 2 / 3, 1 / 6
 # Of a dart's smooth spokes, in units of β: far from the sharp edge, and how that decays towards it.
 FAR_WEIGHT, DECAY = 8 / 3, (5 - 21**0.5) / 2
 # From so many spokes on the even mask of a dart has one form.
@@ -66,15 +62,7 @@ def limit_normals(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> LimitNormals:
     """Return the normals of the limit surface at the limits of the vertices."""
-    around = find_sectors(topology)
-    kind = sector_kinds(topology, around)
-    at, weights = mask_tables(tangent_mask, kind, around.size)
-    sectors = np.empty((len(around.first), 3))
-    read = *walked_arrays(topology), around.first, around.size, at, weights, kind == CORNER
-    blocks.run(
-        len(sectors), lambda begin, end: kernels.sector_normals(points, *read, begin, end, sectors)
-    )
-    return normals_of_sectors(sectors, around, topology.vertex_count)
+    return sector_normals(points, topology, tangent_mask, blocks)
 
 
 # --- positions ------------------------------------------------------------------------------------
@@ -84,27 +72,17 @@ def limit_positions(
     points: Float[np.ndarray, "V 3"], topology: Topology, blocks: Blocks
 ) -> Float[np.ndarray, "V 3"]:
     """Return the limits of three columns."""
-    count, sharp = topology.vertex_count, topology.sharpest
+    count = topology.vertex_count
     limits, valence = np.empty((count, WIDTH)), np.empty(count, dtype=np.int32)
-    blocks.owners(count).run(
-        count,
-        lambda begin, end: masks.sum_rings(
-            points, topology.edges, topology.edge_reach, begin, end, limits, valence
-        ),
-    )
+    ring = points, topology.edges, topology.edge_reach, limits, valence
+    blocks.owners(count).run(count, masks.sum_rings, *ring)
     valences = np.arange(int(valence.max(initial=0)) + 1)
     weight = limit_ring_weight(valences) / np.maximum(valences, 1)
-    blocks.run(
-        count,
-        lambda begin, end: masks.blend_rings(points, valence, weight, begin, end, limits),
-    )
-    if sharp is None:
-        return limits
+    blocks.run(count, masks.blend_rings, points, valence, weight, limits)
     darts = np.flatnonzero(topology.sharp_count == DART)
     if len(darts):
         limits[darts] = _dart_limits(points, topology, darts, beta(valence[darts])[:, None])
-    curve = CURVE_CENTRE, CURVE_NEIGHBOUR
-    masks.blend_sharp(points, sharp.rows, sharp.weights, sharp.neighbours, *curve, limits)
+    follow_curves(points, topology, CURVE_LIMIT, limits)
     return limits
 
 
@@ -115,16 +93,19 @@ def _dart_limits(
     beta_of_darts: Float[np.ndarray, "D 1"],
 ) -> Float[np.ndarray, "D 3"]:
     """Return the limits of the vertices on exactly one sharp edge."""
-    around, sums = find_sectors(topology), np.zeros((topology.vertex_count, WIDTH))
+    around, sums = find_sectors(topology.connectivity), np.zeros((topology.vertex_count, WIDTH))
     total = np.zeros(topology.vertex_count)
     assert topology.sharpest is not None
     # The sharp edge: 2 (β + an eighth of both spokes beside it); that eighth is in the tables.
     sums[darts] = 2 * (points[topology.sharpest.neighbours[darts, 0]] - points[darts])
     total[darts] = 2
     rows = np.flatnonzero(topology.sharp_count[around.vertex] == DART)
-    at, weights = mask_tables(dart_weights, rows < around.opened, around.size[rows])
-    read = around.first, around.size, at, weights, rows
-    kernels.sum_darts(points, *walked_arrays(topology), *read, sums, total)
+    size = around.size[rows]
+    at, tables = mask_tables(dart_weights, rows < around.opened, size)
+    p, q = np.repeat(around.vertex[rows], size), around.spokes[ranges(around.starts[rows], size)]
+    weights = tables[ranges(at, size)]
+    np.add.at(total, p, weights)
+    np.add.at(sums, p, weights[:, None] * (points[q] - points[p]))
     scale = beta_of_darts / (1 + beta_of_darts * total[darts, None])
     return points[darts] + scale * sums[darts]
 

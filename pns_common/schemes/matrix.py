@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.kernels import matrix as kernels
+from pns_common.mesh.rows import ranges
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks
 from pns_common.schemes.base_scheme import BaseScheme
@@ -41,8 +42,7 @@ class SubdivisionMatrix:
         """Return some of the rows."""
         starts = self.starts
         counts = np.diff(starts)[rows]
-        first = np.repeat(starts[rows] - (np.cumsum(counts) - counts), counts)
-        entries = first + np.arange(len(first))
+        entries = ranges(starts[rows], counts)
         own, shape = np.repeat(np.arange(len(rows)), counts), (len(rows), self.shape[1])
         return SubdivisionMatrix(own, self.columns[entries], self.weights[entries], shape)
 
@@ -64,7 +64,6 @@ class SubdivisionMatrix:
 def subdivision_matrix(
     topologies: Sequence[Topology],
     base: BaseScheme,
-    blocks: Blocks | None = None,
     at_last: Place | None = None,
 ) -> SubdivisionMatrix:
     """Return S with S @ values = ``columns.refine_columns(values, topologies, base)``, to rounding.
@@ -73,7 +72,7 @@ def subdivision_matrix(
     two of, of which a mesh needs a few more than its largest valence. `at_last` are masks to apply
     to the refined mesh: ``limit_positions``.
     """
-    blocks = blocks or Blocks()
+    blocks = Blocks()
     made = mask_matrix(topologies[0], base.place, blocks)
     for topology in topologies[1:]:
         made = product(mask_matrix(topology, base.place, blocks), made)
@@ -87,10 +86,10 @@ def mask_matrix(topology: Topology, place: Place, blocks: Blocks) -> Subdivision
     count = topology.vertex_count
     order = np.argsort(topology.corners, kind="stable")
     starts = np.searchsorted(topology.corners[order], np.arange(count + 1))
-    faces = topology.face_of_corner if len(topology.face_of_corner) else np.arange(len(order)) // 3
+    faces = topology.face_of(order)
     colour = np.full(count, -1, dtype=np.int64)
-    read = topology.corners, topology.offsets, faces[order], starts
-    colours = kernels.colour_stars(*read, np.full(count + 1, -1, dtype=np.int64), colour)
+    taken = np.full(count + 1, -1, dtype=np.int64)
+    colours = kernels.colour_stars(topology.connectivity, faces, starts, taken, colour)
     # One column of ones, and one of the vertices' numbers, which tells whose weight it is.
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     named, size = np.arange(1, count + 1, dtype=np.float64), 0

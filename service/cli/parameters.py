@@ -5,38 +5,24 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import typer
 from typer.models import OptionInfo
 
-from ..options import DESCRIPTIONS, PREFIX, Limits, Options
+from ..options import DESCRIPTIONS, EVERYDAY, FILES, MORE, PREFIX, RESEARCH, Limits, Options
 
 Command = TypeVar("Command", bound=Callable[..., None])
 
-# Groups of `--help`, in their order. What is in none is for research.
-_EVERYDAY, _FILES, _MORE, _RESEARCH = "Everyday", "Files", "More", "Research"
+# The groups of what is no field of `Options`; in each these come first.
 _PANELS = {
-    **dict.fromkeys(("output", "levels", "tolerance", "max_faces"), _EVERYDAY),
-    **dict.fromkeys(("max_edge_length", "crease", "scheme", "limit", "normals"), _EVERYDAY),
-    **dict.fromkeys(("to", "read_as", "force", "compress", "report", "dry_run"), _FILES),
-    **dict.fromkeys(("uv", "weld", "weld_tolerance", "border", "polygons"), _MORE),
-    **dict.fromkeys(("material", "group", "engine", "address", "workers"), _MORE),
+    "output": EVERYDAY,
+    **dict.fromkeys(("to", "read_as", "force", "report", "dry_run"), FILES),
+    **dict.fromkeys(("engine", "address", "workers"), MORE),
 }
-_ORDER = [*_PANELS]
-_METAVARS = {
-    "budget": "C",
-    "reference_length": "auto|X",
-    "crease": "auto|off|normals|angle:DEG",
-    "weld_tolerance": "X",
-    "material": "NAME",
-    "group": "NAME",
-    "tolerance": "X|X%",
-    "max_faces": "N",
-    "max_edge_length": "X|X%",
-}
+_ORDER = (EVERYDAY, FILES, MORE, RESEARCH)
 
 
 def takes_options(command: Command) -> Command:
@@ -52,7 +38,7 @@ def takes_options(command: Command) -> Command:
             option.name,
             inspect.Parameter.KEYWORD_ONLY,
             default=option.default,
-            annotation=Annotated[hints[option.name], _described(option.name)],
+            annotation=Annotated[hints[option.name], _described(option)],
         )
         for option in fields(Options)
     ]
@@ -64,23 +50,23 @@ def takes_options(command: Command) -> Command:
 
 
 def _place(parameter: inspect.Parameter) -> int:
-    """Return an option's place in `--help`, and put it into its group; arguments come first."""
+    """Return the place of an option's group in `--help`; arguments come first."""
     shown, *_ = getattr(parameter.annotation, "__metadata__", (None,))
     if not isinstance(shown, OptionInfo):
         return -1
-    shown.rich_help_panel = _PANELS.get(parameter.name, _RESEARCH)
-    return _ORDER.index(parameter.name) if parameter.name in _PANELS else len(_ORDER)
+    if shown.rich_help_panel is None:
+        shown.rich_help_panel = _PANELS.get(parameter.name, RESEARCH)
+    return _ORDER.index(shown.rich_help_panel)
 
 
-def _described(name: str) -> Any:
-    flag = f"--{name.replace('_', '-')}"
-    if name == "limit":
-        flag += "/--no-limit"
+def _described(option: Field[Any]) -> Any:
+    flag = f"--{option.name.replace('_', '-')}"
     return typer.Option(
-        flag,
-        help=DESCRIPTIONS[name],
-        metavar=_METAVARS.get(name),
-        parser=_reference_length if name == "reference_length" else None,
+        f"{flag}/--no-{option.name}" if option.type == "bool" else flag,
+        help=DESCRIPTIONS[option.name],
+        metavar=option.metadata["metavar"],
+        rich_help_panel=option.metadata["panel"],
+        parser=_reference_length if option.name == "reference_length" else None,
     )
 
 

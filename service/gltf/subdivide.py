@@ -11,9 +11,10 @@ from pns_common.model.session import Model
 from pns_common.operator.scheme import Scheme, catmull_clark, named_scheme, pns
 
 from ..bodies.sibling_files import ALONE, SiblingFiles
+from ..changes import Change
 from ..errors import InvalidParameter, NoModelError
 from ..options import Limits, Options
-from ..report import Change, MeshResult, build_report
+from ..report import MeshResult, build_report
 from ..stages import Stages
 from .read.container import encode, write_glb
 from .read.plan import BYTES_FOR_LIMIT, BYTES_FOR_NORMALS, check_cost
@@ -201,12 +202,13 @@ def _refined(
             packing += BYTES_FOR_NORMALS
         if options.limit:
             packing += BYTES_FOR_LIMIT
-        upload = read_upload(data, media, options.levels, limits, siblings, packing)
+        upload = read_upload(data, media, options.faces_after, limits, siblings, packing)
         scheme = _for_polygons(upload, scheme, options)
         if scheme.base.polygons:
             # A triangle alone becomes six, where Loop's scheme makes four.
             more = packing + (BYTES_PER_FACE_OF_MESH + packing) // 2
-            check_cost(upload.document, upload.plans, len(data), options.levels, limits, more)
+            after = options.faces_after
+            check_cost(upload.document, upload.plans, len(data), after, limits, more)
         instances = mesh_instances(upload.document)
         changes = _changes_of_container(upload, options)
         changes += upload.changes + storage_changes(upload.document, upload.plans)
@@ -298,5 +300,5 @@ def polygon_scheme(options: Options, model: Model | None) -> Scheme | None:
 def _changes_of_container(upload: Upload, options: Options) -> list[Change]:
     changes: list[Change] = []
     if options.diagnostics != "none" and replaces_extras(upload.tree):
-        changes.append(Change("/asset/extras", "moved to /asset/extras/extras", 1))
+        changes.append(Change("/asset/extras", "extras-moved", 1))
     return changes

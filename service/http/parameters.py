@@ -4,28 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from pydantic import BeforeValidator, ConfigDict, Field, create_model
 from pydantic_core import PydanticCustomError
 
 from ..bodies.media import Kind
-from ..options import (
-    CREASE_PATTERN,
-    DESCRIPTIONS,
-    LENGTH_PATTERN,
-    MAX_LEVELS,
-    MAX_WELD_TOLERANCE,
-    Options,
-)
+from ..options import DESCRIPTIONS, Options
 
 _EMPTY_IS_NONE = BeforeValidator(lambda value: None if value == "" else value)
-
-
-def _optional(kind: Any, **bounds: Any) -> Any:
-    """Return the type of a parameter that may be absent, as `budget=` in a URL is."""
-    bounded = Annotated[kind, Field(**bounds)]
-    return Annotated[bounded | None, _EMPTY_IS_NONE]
 
 
 def _length(value: Any) -> float | Literal["auto"]:
@@ -41,27 +28,21 @@ def _length(value: Any) -> float | Literal["auto"]:
     return length
 
 
-_NAME = _optional(str)
-_LENGTH = _optional(str, pattern=f"^{LENGTH_PATTERN}$")
-# Where a type of `Options` does not say all that it refuses.
-_TYPES = get_type_hints(Options) | {
-    "levels": Annotated[int, Field(ge=1, le=MAX_LEVELS)],
-    "budget": _optional(float, ge=0, allow_inf_nan=False),
-    "reference_length": Annotated[
-        Literal["auto"] | Annotated[float, Field(gt=0, allow_inf_nan=False)],
-        BeforeValidator(_length),
-    ],
-    "crease": Annotated[str, Field(pattern=f"^({CREASE_PATTERN})$")],
-    "weld_tolerance": Annotated[float, Field(ge=0, le=MAX_WELD_TOLERANCE, allow_inf_nan=False)],
-    "material": _NAME,
-    "tolerance": _LENGTH,
-    "max_faces": _optional(int, ge=1),
-    "max_edge_length": _LENGTH,
-    "group": _NAME,
-}
+def _type_of(name: str, hint: Any, bounds: dict[str, Any]) -> Any:
+    """Return a parameter's type with its bounds; `budget=` in a URL is none."""
+    if name == "reference_length":
+        positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+        return Annotated[Literal["auto"] | positive, BeforeValidator(_length)]
+    kinds = get_args(hint)
+    if type(None) not in kinds:
+        return Annotated[hint, Field(**bounds)]
+    return Annotated[Annotated[kinds[0], Field(**bounds)] | None, _EMPTY_IS_NONE]
+
+
+_HINTS = get_type_hints(Options)
 _SHARED: dict[str, Any] = {
     option.name: (
-        _TYPES[option.name],
+        _type_of(option.name, _HINTS[option.name], option.metadata["bounds"]),
         Field(default=option.default, description=DESCRIPTIONS[option.name]),
     )
     for option in fields(Options)

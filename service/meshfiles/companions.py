@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from ..bodies.sibling_files import File, Opened
+from ..changes import Change, counted
 from ..errors import UnreadableError
-from ..report import Change
 from .mtl import files_of_obj, found
 from .ply import ply_header
 
@@ -45,12 +45,5 @@ def copied(
             made.append(file.name)
         elif there != content:
             left.append(file.name)
-    told = {
-        "copied beside the result": made,
-        "not copied, since others of these names lie there (--force replaces them)": left,
-    }
-    return [
-        Change("", f"{what}: {', '.join(names)}", len(names))
-        for what, names in told.items()
-        if names
-    ]
+    told = ("copied-beside", made), ("not-copied", left)
+    return counted({(code, ", ".join(names)): len(names) for code, names in told})

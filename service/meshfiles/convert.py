@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import time
-from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -24,12 +22,12 @@ from pns_common.operator.scheme import Scheme
 
 from ..bodies.media import ALIASES, GLTF_KINDS, KINDS, kind_of
 from ..bodies.sibling_files import ALONE, Opened, SiblingFiles, folder_of
+from ..changes import Advice, Change, lines_of, with_changes, with_flags
 from ..errors import InvalidParameter, ServiceError, printable
 from ..gltf.read.upload import Media, Upload, read_upload
 from ..gltf.subdivide import make_scheme, polygon_scheme, refine_scene, subdivide_gltf
 from ..gltf.write.storage import Arrays, matrix_arrays
 from ..options import MAX_LEVELS, Limits, Options
-from ..report import Change, changes_of, hint_on
 from ..stages import Stages
 from .companions import companions, copied
 from .flatten import Surface, check_copies, flatten
@@ -47,7 +45,7 @@ if TYPE_CHECKING:
 
 # Stdin, or stdout.
 STREAM = Path("-")
-NOT_COMPRESSED = Change("", "not compressed: only a glTF is", 1)
+NOT_COMPRESSED = Change("", "not-compressed", 1)
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,10 @@ def _convert_one(
     if jobs.report is not None:
         text = msgspec.json.format(msgspec.json.encode(written.report), indent=2)
         replace_file(jobs.report, text + b"\n")
-    for line in (*lines_of(written.report), *map(as_flags, written.report["advice"])):
+    for line in (
+        *lines_of(written.report),
+        *(with_flags(Advice(**each)) for each in written.report["advice"]),
+    ):
         console.print(printable(line), markup=False)
     seconds = time.perf_counter() - began
     name = "stdout" if job.output == STREAM else job.output
@@ -268,10 +269,11 @@ def converted(
     with stages.part(0.1, 0.8):
         refined, report = refine_mesh_file(mesh, scheme, options, limits, stages, traced=traced)
     if model is not None and options.learns and scheme.rule is None:
-        without = (
+        text = (
             f"the model {model.name} has no rules for polygons, so this is {scheme.name} without "
             "it: use scheme=pns to cut them into triangles for it"
         )
+        without = Advice(text, ("scheme=pns",)).as_entry()
         report = {**report, "advice": [without, *report["advice"]]}
     with stages.stage("write", 0.8, 1.0):
         if target in GLTF_KINDS:
@@ -280,14 +282,7 @@ def converted(
             written = replace(written, triangles=_triangles_of(refined))
         else:
             near = nearby(refined.libraries, Opened(siblings))
-            kept, changes = held(replace(refined, libraries=near), target)
-            written = Written(
-                FORMATS[target].write(kept),
-                with_changes(report, changes),
-                len(kept.sizes),
-                _triangles_of(kept),
-                parents=_map_of(kept, target),
-            )
+            written = _of_mesh(replace(refined, libraries=near), report, [], target)
     return replace(written, seconds=stages.seconds, faces_in=len(mesh.sizes))
 
 
@@ -295,10 +290,17 @@ def _triangles_of(mesh: MeshFile) -> int:
     return len(mesh.corners) - 2 * len(mesh.sizes)
 
 
-def _map_of(mesh: MeshFile, target: str) -> Arrays:
-    if mesh.parents is None:
-        return {}
-    return matrix_arrays(mesh.parents.take(FORMATS[target].order(mesh)))
+def _of_mesh(
+    mesh: MeshFile, report: dict[str, Any], changes: Sequence[Change], target: str
+) -> Written:
+    """Write what a format can hold of a refined mesh; report what it cannot."""
+    kept, lost = held(mesh, target)
+    report = with_changes(report, [*changes, *lost])
+    parents: Arrays = {}
+    if kept.parents is not None:
+        parents = matrix_arrays(kept.parents.take(FORMATS[target].order(kept)))
+    content, faces = FORMATS[target].write(kept), len(kept.sizes)
+    return Written(content, report, faces, _triangles_of(kept), parents=parents)
 
 
 def _taken(
@@ -315,62 +317,35 @@ def _taken(
 
 
 def predicted_faces(
-    data: bytes, kind: str, options: Options, limits: Limits, siblings: SiblingFiles
-) -> int:
-    """Return how many faces the refined file will have, found without refining.
+    data: bytes,
+    kind: str,
+    options: Options,
+    model: Model | None,
+    limits: Limits,
+    siblings: SiblingFiles,
+) -> tuple[int, int]:
+    """Return how many faces a file has, and how many the refined one will have.
+
+    With a goal they are refined and counted, and nothing is written; else they are known before.
 
     Raises:
-        ServiceError: the file cannot be used, or would be over a limit; or a goal is given.
+        ServiceError, PnsError: the file cannot be used, or would be over a limit.
     """
-    if options.goals:
-        raise InvalidParameter(
-            "dry_run",
-            f"how many faces {', '.join(options.goals)} gives is known when they are made",
-        )
     if kind in GLTF_KINDS:
-        upload = read_upload(data, kind, options.levels, limits, siblings)
-        return sum(mesh.faces for mesh in upload.plans) * 4**options.levels
+        if options.goals:
+            asked = options, model, limits, Stages(), siblings
+            scene = refine_scene(data, kind, *asked, check=lambda upload: None)
+            return scene.faces_in, scene.report["totals"]["faces"]
+        upload = read_upload(data, kind, options.faces_after, limits, siblings)
+        faces = sum(mesh.faces for mesh in upload.plans)
+        return faces, options.faces_after(faces)
     mesh = read_within(data, kind, limits)
+    if options.goals:
+        taken, scheme = _taken(mesh, options, model, limits)
+        _, report = refine_mesh_file(taken, scheme, options, limits)
+        return len(mesh.sizes), report["totals"]["faces"]
     check_cost(mesh, options, limits)
-    return faces_after(mesh, options.levels)
-
-
-def lines_of(report: dict[str, Any]) -> Iterator[str]:
-    """Yield what was changed or lost, each thing once: how often, what to do, and where first."""
-    names = {
-        f"/meshes/{mesh['index']}": mesh["name"] for mesh in report["meshes"] if "name" in mesh
-    }
-    said: Counter[str] = Counter()
-    places: defaultdict[str, list[str]] = defaultdict(list)
-    for change in report["changes"]:
-        said[change["what"]] += change["count"]
-        places[change["what"]] += [change["pointer"]] if change["pointer"] else []
-    for what, count in said.items():
-        first, *others = places[what] or [""]
-        where = (
-            f"{first} and {len(others)} more place{'s' * (len(others) > 1)}" if others else first
-        )
-        if name := names.get("/".join(first.split("/")[:3])):
-            where = f"{name}, {where}"
-        yield _line(count, what) + (f" ({where})" if where else "")
-    for name, count in report["dropped"].items():
-        what = f"{name.replace('_', ' ')} dropped"
-        if count and what not in said:
-            yield _line(count, what)
-    irregular = report["levels"][0]["edges"]["irregular"] if report["levels"] else 0
-    if irregular:
-        yield _line(irregular, "non-manifold edge, refined as a border")
-
-
-def _line(count: int, what: str) -> str:
-    hint = hint_on(what)
-    return f"{count:,} × {what}" + (f": {as_flags(hint)}" if hint else "")
-
-
-def as_flags(text: str) -> str:
-    """Return advice with the options as the command line spells them."""
-    options = r"\b(compress|crease|normals|scheme|weld_tolerance)="
-    return re.sub(options, lambda found: f"--{found[1].replace('_', '-')} ", text)
+    return len(mesh.sizes), faces_after(mesh, options)
 
 
 def _kind(name: str, path: Path) -> str:
@@ -424,9 +399,7 @@ def _flattened(
     siblings: SiblingFiles,
 ) -> Written:
     """Refine a glTF and write its scene as one mesh."""
-    changes: list[Change] = []
-    if options.compress != "none":
-        changes.append(NOT_COMPRESSED)
+    changes = [NOT_COMPRESSED] if options.compress != "none" else []
     # How many faces a goal makes of one is not known yet.
     each = 1 if options.goals else 4**options.levels
 
@@ -440,17 +413,9 @@ def _flattened(
             for mesh, refined in scene.meshes.items()
         }
         mesh, lost = flatten(scene.upload, surfaces, target, limits)
-        kept, also_lost = held(mesh, target)
-        content = FORMATS[target].write(kept)
-    # A mesh that several nodes show is there several times.
-    report = with_changes(scene.report, [*changes, *lost, *also_lost])
-    faces = len(kept.sizes)
-    return Written(content, report, faces, faces, stages.seconds, scene.faces_in)
-
-
-def with_changes(report: dict[str, Any], changes: list[Change]) -> dict[str, Any]:
-    """Return a report that tells of more changes."""
-    return report | changes_of([*(Change(**each) for each in report["changes"]), *changes])
+        # A mesh that several nodes show is there several times.
+        written = _of_mesh(mesh, scene.report, [*changes, *lost], target)
+    return replace(written, seconds=stages.seconds, faces_in=scene.faces_in)
 
 
 @contextmanager

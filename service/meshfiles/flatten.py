@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
-from pns_common.mesh.rows import disjoint_faces, unit
+from pns_common.mesh.rows import disjoint_faces, marked, unit
 
+from ..changes import Change, counted
 from ..errors import GltfError, UnrefinableError, check_limit
 from ..gltf.constants import FLOAT, OUTLINE, SURFACES, TRIANGLES
 from ..gltf.read.accessors import as_float, read
@@ -21,9 +22,8 @@ from ..gltf.read.schema import Document
 from ..gltf.read.upload import Upload
 from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.skin import read_skin_and_morph
-from ..meshes.weld import weld, weld_by_label
+from ..meshes.weld import weld
 from ..options import Limits
-from ..report import Change
 from .formats import FORMATS, Format
 from .mesh_file import (
     COLOUR,
@@ -110,14 +110,13 @@ def flatten(
     # A format without normals has named them already.
     room = FORMATS[kind].layers
     turned *= room is None or NORMAL in room
-    for what, count in (
-        ("hidden nodes", len(left & hidden)),
-        ("nodes outside of the default scene", len(left - worlds.keys())),
-        ("normals of skinned meshes", turned),
-    ):
-        if count:
-            changes.append(Change("/nodes", f"{what} left out", count))
-    return mesh_file, changes
+    left_out = {
+        "hidden nodes": len(left & hidden),
+        "nodes outside of the default scene": len(left - worlds.keys()),
+        "normals of skinned meshes": turned,
+    }
+    told = {("left-out", what): count for what, count in left_out.items()}
+    return mesh_file, changes + counted(told, "/nodes")
 
 
 def check_copies(upload: Upload, faces: Mapping[int, int], limits: Limits) -> list[tuple[int, int]]:
@@ -316,18 +315,23 @@ def _place(
     follows = read_skin_and_morph(primitives)
     for weight, delta in zip(weights, follows.deltas, strict=False):
         positions += weight * delta.astype(np.float64)
-    faces = disjoint_faces((p.corners, len(p.attributes["POSITION"])) for p in primitives)
     known = [surface.vertex for surface in surfaces if surface.vertex is not None]
+    ends = np.cumsum([len(p.attributes["POSITION"]) for p in primitives])
+    corners = [p.corners for p in primitives]
     if len(known) == len(surfaces):
-        welded = weld_by_label(positions, faces, np.concatenate(known))
+        vertex_of = np.concatenate(known)
+        used = np.flatnonzero(marked(vertex_of, int(vertex_of.max()) + 1))
+        vertex_of = vertex_of if used[-1] + 1 == len(used) else np.searchsorted(used, vertex_of)
     else:
-        welded = weld(positions, faces, follows.labels)
-    used = np.flatnonzero(welded.vertex_of >= 0)[::-1]
-    rows = np.empty(len(welded.points), dtype=np.int64)
-    rows[welded.vertex_of[used]] = used
-    world = welded.points @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = disjoint_faces(zip(corners, np.diff(ends, prepend=0), strict=True))
+        vertex_of = weld(positions, faces, follows.labels).vertex_of
+    used = np.flatnonzero(vertex_of >= 0)
+    rows = np.empty(int(vertex_of.max()) + 1, dtype=np.int64)
+    rows[vertex_of[used]] = used
+    points = positions[rows]
+    world = _times(points, matrix[:3, :3]) + matrix[:3, 3]
     if joints is not None and follows.binding is not None:
-        world = posed(welded.points, follows.binding.take(rows), joints, placed=world)
+        world = posed(points, follows.binding.take(rows), joints, placed=world)
         matrix = joints[0]
     # A mirroring node turns faces over; their order of corners keeps them facing outwards.
     mirrored = np.linalg.det(matrix[:3, :3]) < 0
@@ -350,15 +354,24 @@ def _place(
     }
     for name in dict.fromkeys(n for p in primitives for n in p.attributes if n.startswith("_")):
         columns[name] = [p.attributes.get(name) for p in primitives]
-    corners = [p.corners[:, turn].reshape(-1) for p in primitives]
+    corners = [own[:, turn].reshape(-1) for own in corners]
     layers = {
         name: joined_layer(list(zip(values, corners, strict=True)))
         for name, values in columns.items()
         if any(column is not None for column in values)
     }
     of_face = np.repeat(materials, [len(p.corners) for p in primitives])
-    placed = of_triangles(world, welded.faces[:, turn])
+    vertices = np.split(vertex_of, ends[:-1])
+    vertices = [own[places] for own, places in zip(vertices, corners, strict=True)]
+    placed = of_triangles(world, np.concatenate(vertices).reshape(-1, 3))
     return replace(placed, layers=layers, labels={MATERIAL: Labels((), of_face)})
+
+
+def _times(
+    rows: Float[np.ndarray, "N 3"], matrix: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "N 3"]:
+    """Return the product of a matrix with each row, by no BLAS, whose bits differ by machine."""
+    return np.einsum("ni,ji->nj", rows, matrix)
 
 
 def _turned(
@@ -368,7 +381,7 @@ def _turned(
     linear = matrix[:3, :3]
     cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]])
     sign = np.sign(np.linalg.det(linear)) or 1.0
-    return unit(sign * normals.astype(np.float64) @ cofactors.T)
+    return unit(_times(normals.astype(np.float64), sign * cofactors))
 
 
 def _uv(primitive: TrianglePrimitive, material: dict[str, Any]) -> Float[np.ndarray, "N 2"] | None:
@@ -410,8 +423,10 @@ def _joined(
         labels[MATERIAL] = Labels(tuple(materials), of_face)
         if form.unit and COLOUR not in layers:
             layers[COLOUR] = Layer(_shown_colours(tree), np.repeat(of_face, 3))
-    faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
-    made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
+    made = placed[0]
+    if len(placed) > 1:
+        faces = disjoint_faces((mesh.faces, len(mesh.vertices)) for mesh in placed)
+        made = of_triangles(np.concatenate([mesh.vertices for mesh in placed]), faces)
     labels = {kind: label for kind, label in labels.items() if kind in form.labels}
     made = replace(made, layers=layers, labels=labels)
     if form.unit:
@@ -433,28 +448,31 @@ def _shown_colours(tree: dict[str, Any]) -> UInt8[np.ndarray, "M 4"]:
 
 def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str) -> list[Change]:
     """Return what no format of plain meshes is given; what one of them cannot hold, it reports."""
-    why = f": not written to {kind.upper()} files"
+
+    def lost_at(pointer: str, counts: dict[str, int]) -> list[Change]:
+        return counted(
+            {("not-written", what, kind.upper()): counts[what] for what in counts}, pointer
+        )
+
     changes = [
-        Change(f"/{name}", f"{name} dropped{why}", len(tree[name]))
-        for name in LOST
-        if tree.get(name)
+        change for name in LOST for change in lost_at(f"/{name}", {name: len(tree.get(name) or ())})
     ]
     named = "definitions of materials" if MATERIAL in FORMATS[kind].labels else "materials"
-    changes += [
-        Change(pointer, f"{what} dropped{why}", count)
-        for pointer, what, count in (
-            ("/materials", named, len(tree.get("materials", []))),
-            ("/meshes", "morph targets", _count_targets(tree)),
-            ("/meshes", "points and lines", _count_other_modes(tree)),
-            ("/meshes", "outlines", _count_outlines(tree)),
-        )
-        if count
-    ]
+    changes += lost_at("/materials", {named: len(tree.get("materials", []))})
+    of_mesh = [mesh.get("primitives", []) for mesh in tree.get("meshes", [])]
+    primitives = [primitive for own in of_mesh for primitive in own]
+    modes = [primitive.get("mode", TRIANGLES) for primitive in primitives]
+    targets = ([len(primitive.get("targets", [])) for primitive in own] for own in of_mesh)
+    of_meshes = {
+        "morph targets": sum(max(own, default=0) for own in targets),
+        "points and lines": sum(mode not in SURFACES for mode in modes),
+        "outlines": sum(OUTLINE in p.get("extensions", {}) for p in primitives),
+    }
+    changes += lost_at("/meshes", of_meshes)
     children = _children(tree.get("nodes", []))
-    if again := len(children) - len(set(children)):
-        changes.append(Change("/nodes", "nodes with several parents placed once, by one", again))
-    if placed > 1:
-        changes.append(Change("/nodes", "nodes joined into one mesh in world space", placed))
+    again = len(children) - len(set(children))
+    told = {"several-parents": again, "nodes-joined": placed if placed > 1 else 0}
+    changes += counted(told, "/nodes")
     form = FORMATS[kind]
     kept = {"POSITION", *((UV, NORMAL, COLOUR) if form.layers is None else form.layers)}
     lost = {
@@ -463,32 +481,5 @@ def _changes(tree: dict[str, Any], placed: int, names: list[set[str]], kind: str
         for name in own - kept
         if not (form.layers is None and name.startswith("_"))
     }
-    changes += [
-        Change("/meshes", f"attribute {name} dropped{why}", sum(name in own for own in names))
-        for name in sorted(lost)
-    ]
-    return changes
-
-
-def _count_targets(tree: dict[str, Any]) -> int:
-    return sum(
-        max(
-            (len(primitive.get("targets", [])) for primitive in mesh.get("primitives", [])),
-            default=0,
-        )
-        for mesh in tree.get("meshes", [])
-    )
-
-
-def _count_outlines(tree: dict[str, Any]) -> int:
-    primitives = (p for mesh in tree.get("meshes", []) for p in mesh.get("primitives", []))
-    return sum(OUTLINE in primitive.get("extensions", {}) for primitive in primitives)
-
-
-def _count_other_modes(tree: dict[str, Any]) -> int:
-    """Return how many primitives are no surfaces."""
-    return sum(
-        primitive.get("mode", TRIANGLES) not in SURFACES
-        for mesh in tree.get("meshes", [])
-        for primitive in mesh.get("primitives", [])
-    )
+    counts = {f"attribute {name}": sum(name in own for own in names) for name in sorted(lost)}
+    return changes + lost_at("/meshes", counts)

@@ -11,11 +11,11 @@ from jaxtyping import Bool, Float, Int
 from pns_common.mesh.mesh import fans
 from pns_common.mesh.rows import marked
 
+from ..changes import Change, counted
 from ..errors import UnreadableError, UnrefinableError
 from ..gltf.read.plan import check_memory
 from ..gltf.refine.changes import STEPS, faces_too_far
 from ..options import Limits
-from ..report import Change
 from .mesh_file import (
     COLOUR,
     GROUP,
@@ -161,8 +161,8 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
     count = len(mesh.vertices)
     proper = mesh.sizes >= 3
     if not proper.all():
-        told = "faces of fewer than three vertices dropped"
-        mesh = mesh.of_faces(proper).with_changes([Change("", told, int((~proper).sum()))])
+        told = {"few-corners": int((~proper).sum())}
+        mesh = mesh.of_faces(proper).with_changes(counted(told))
     if len(mesh.corners) == 0:
         raise UnreadableError(f"the {kind.upper()} file has no faces of three vertices")
     if not (mesh.corners.min() >= 0 and mesh.corners.max() < count):
@@ -180,8 +180,7 @@ def read_polygons(data: bytes, kind: str) -> MeshFile:
             f"vertex {wrong[0]} of the {kind.upper()} file has a coordinate that is NaN or infinite"
         )
     unused = count - int(np.count_nonzero(used))
-    told = [Change("", "vertices dropped that no face uses", unused)] if unused else []
-    return mesh.with_changes(told)
+    return mesh.with_changes(counted({"unused-vertices": unused}))
 
 
 def read_within(data: bytes, kind: str, limits: Limits) -> MeshFile:
@@ -206,7 +205,6 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     """
     form, lost = FORMATS[kind], dict[str, int]()
     mesh = triangulated(mesh) if form.triangles else mesh
-    why = f" dropped: not written to {kind.upper()} files"
     layers = {
         name: layer
         for name, layer in mesh.layers.items()
@@ -245,7 +243,8 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     libraries = mesh.libraries if MATERIAL in form.labels else ()
     textures = mesh.textures if kind == "ply" else ()
     lost["names of textures"] = len(mesh.textures) - len(textures)
-    changes = [Change("", what + why, count) for what, count in sorted(lost.items()) if count]
+    told = {("not-written", what, kind.upper()): count for what, count in sorted(lost.items())}
+    changes = counted(told)
     held = replace(mesh, layers=layers, face_values=values, labels=labels)
     mesh = replace(held, libraries=libraries, textures=textures)
     names = form.vertex_layers
@@ -263,18 +262,13 @@ def rounding_changes(mesh: MeshFile) -> list[Change]:
     """
     if np.abs(mesh.vertices).max() > LARGEST:
         raise UnrefinableError("positions leave the range of float32; write an OBJ or OFF file")
-    faces = mesh.corners[fans(mesh.offsets)[0]]
+    triangles = (mesh.sizes == 3).all()
+    faces = mesh.faces if triangles else mesh.corners[fans(mesh.offsets)[0]]
     rounded, flat = mesh.vertices.astype(np.float32), 0
     if not np.array_equal(rounded, mesh.vertices):
         flat = int((_without_area(rounded, faces) & ~_without_area(mesh.vertices, faces)).sum())
-    rounding = "once positions are rounded to float32"
-    told = {
-        f"faces without an area {rounding}": flat,
-        f"faces too far from the origin {rounding}: fewer than {STEPS} steps to a side": (
-            faces_too_far(mesh.vertices, faces)
-        ),
-    }
-    return [Change("", what, count) for what, count in told.items() if count]
+    far = faces_too_far(mesh.vertices, faces)
+    return counted({"rounded-flat": flat, ("rounded-far", str(STEPS)): far})
 
 
 def _without_area(

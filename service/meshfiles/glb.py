@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Int
 
 from ..bodies.sibling_files import Opened, SiblingFiles
+from ..changes import Change, counted, with_changes
 from ..gltf.constants import COMPONENT_TYPES, FLOAT, NGONS, UNSIGNED_INT
 from ..gltf.read.container import decode_object, encode, read_glb, write_glb
 from ..gltf.read.resources import embed_images
@@ -23,7 +24,6 @@ from ..gltf.write.compression import WRITERS
 from ..gltf.write.storage import put_report
 from ..gltf.write.writer import Writer
 from ..options import Limits, Options
-from ..report import Change
 from ..stages import Stages
 from .formats import rounding_changes
 from .mesh_file import COLOUR, MATERIAL, NONE, NORMAL, UV, Labels, Layer, MeshFile
@@ -58,8 +58,7 @@ def as_glb(
     """
     changes, opened = rounding_changes(mesh), Opened(siblings)
     if mesh.textures and UV not in mesh.layers:
-        what = "names of textures dropped: there are no texture coordinates"
-        changes.append(Change("", what, len(mesh.textures)))
+        changes += counted({"no-coordinates": len(mesh.textures)})
     mesh = _with_textures(mesh)
     mesh, lost = _with_colours_at_corners(mesh)
     changes += lost
@@ -71,15 +70,11 @@ def as_glb(
         made = textured(names, opened)
     else:
         made = materials_of(names, mesh.libraries, mesh.encoding, opened)
-    changes += [
-        Change("", f"{keyword} of materials dropped: not written to GLB files", count)
-        for keyword, count in made.lost.items()
-    ]
-    changes += incomplete + [
-        Change("", f"materials not found: no {name} came with the file", 1)
-        for name in mesh.libraries
-        if not library_files(name, opened)
-    ]
+    changes += _not_written(
+        {f"{keyword} of materials": made.lost[keyword] for keyword in made.lost}
+    )
+    missing = [name for name in mesh.libraries if not library_files(name, opened)]
+    changes += incomplete + counted({("no-library", name): 1 for name in missing})
     materials = [*made.entries, {"pbrMetallicRoughness": PLAIN}]
     shown = [_shown(part, materials) for part in parts]
     if all(part.material != len(materials) - 1 for part in shown):
@@ -90,7 +85,7 @@ def as_glb(
         tree["textures"] = [{"source": number} for number in range(len(made.images))]
     buffers: list[memoryview] = []
     changes += embed_images(tree, view(tree), buffers, opened)
-    changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
+    changes += counted({("unused-file", name): 1 for name in opened.unused})
     writer = WRITERS[options.compress].start(tree, buffers)
     # The first corner of a triangle counts.
     writer.in_order = quads
@@ -98,11 +93,9 @@ def as_glb(
     vertices = _write_parts(writer, shown, stages, ngons=ngons)
     changes += writer.changes()
     if quads and not ngons:
-        changes.append(Change("", f"{NGONS} left out: Draco orders triangles anew", 1))
-    report = report | {
-        "totals": report["totals"] | {"primitives": len(shown), "vertices": vertices},
-        "changes": [*report["changes"], *(asdict(change) for change in changes)],
-    }
+        changes += counted({("ngons-reordered", NGONS): 1})
+    totals = report["totals"] | {"primitives": len(shown), "vertices": vertices}
+    report = with_changes(report | {"totals": totals}, changes)
     if options.diagnostics != "none":
         put_report(tree, report)
     pieces = writer.finish()
@@ -200,14 +193,17 @@ def _shown(part: Part, materials: list[dict[str, Any]]) -> Part:
     return part
 
 
+def _not_written(counts: dict[str, int]) -> list[Change]:
+    return counted({("not-written", what, "GLB"): count for what, count in counts.items()})
+
+
 def _with_colours_at_corners(mesh: MeshFile) -> tuple[MeshFile, list[Change]]:
     """Return faces' colours as their corners', which is all that a glTF has; return what goes."""
     lost = {f"face property {name}": len(own) for name, own in mesh.face_values.items()}
     if lost.pop(f"face property {COLOUR}", 0) and COLOUR in mesh.layers:
         lost["colours of faces, as vertices have some,"] = len(mesh.sizes)
     lost |= {f"{kind}s": len(own.names) for kind, own in mesh.labels.items() if kind != MATERIAL}
-    why = "dropped: not written to GLB files"
-    changes = [Change("", f"{what} {why}", count) for what, count in lost.items()]
+    changes = _not_written(lost)
     colours = mesh.face_values.get(COLOUR)
     if colours is None or COLOUR in mesh.layers:
         return mesh, changes

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common.schemes.matrix import SubdivisionMatrix
 
-from ..report import Change
+from ..changes import Change, counted
 from .tags import Tags
 
 # Layers are called as glTF calls attributes; other properties begin with an underscore.
@@ -82,7 +83,7 @@ class MeshFile:
     parents: SubdivisionMatrix | None = None
     unit: str = ""
 
-    @property
+    @cached_property
     def sizes(self) -> Int[np.ndarray, " F"]:
         """Number of corners of each polygon."""
         return np.diff(self.offsets)
@@ -125,7 +126,7 @@ def of_triangles(
     normals: Float[np.ndarray, "V 3"] | None = None,
 ) -> MeshFile:
     """Make a mesh of triangles; `uv` and `normals` are those of the vertices."""
-    corners = faces.reshape(-1).astype(np.int64)
+    corners = faces.reshape(-1).astype(np.int64, copy=False)
     given = {NORMAL: normals, UV: uv}
     layers = {name: Layer(values, corners) for name, values in given.items() if values is not None}
     return MeshFile(vertices, np.arange(0, len(corners) + 1, 3), corners, layers)
@@ -182,4 +183,4 @@ def offsets_of(sizes: Int[np.ndarray, " F"]) -> Int[np.ndarray, " F1"]:
 
 def dropped(names: dict[str, int]) -> tuple[Change, ...]:
     """Return a change for each kind of thing of which a reader dropped some."""
-    return tuple(Change("", f"{name} dropped", count) for name, count in names.items() if count)
+    return tuple(counted({("dropped", name): count for name, count in names.items()}))

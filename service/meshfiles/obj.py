@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from io import BytesIO
 from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+
+from pns_common.kernels.text import write_faces
 
 from .mesh_file import (
     COLOUR,
@@ -293,37 +296,42 @@ def write_obj(mesh: MeshFile) -> bytes:
 
     The first object stands before the vertices.
     """
-    pieces = [f"mtllib {name}\n".encode(mesh.encoding) for name in mesh.libraries]
+    file = BytesIO()
+    file.writelines(f"mtllib {name}\n".encode(mesh.encoding) for name in mesh.libraries)
     objects = mesh.labels.get(OBJECT)
-    first = NONE if objects is None or not len(mesh.sizes) else int(objects.of_face[0])
+    first = NONE if objects is None else int(objects.of_face[0])
     if objects is not None and first >= 0:
-        pieces.append(f"o {objects.names[first]}\n".encode(mesh.encoding))
+        file.write(f"o {objects.names[first]}\n".encode(mesh.encoding))
     colours = mesh.layers.get(COLOUR)
     rows = mesh.vertices
     if colours is not None:
         of_vertex = np.zeros((len(rows), 3))
         of_vertex[mesh.corners] = as_fractions(colours.values)[colours.rows, :3]
         rows = np.hstack([rows, of_vertex])
-    pieces += rows_text(f"v{f' {NUMBER}' * rows.shape[1]}\n", rows)
-    uv, normals = mesh.layers.get(UV), mesh.layers.get(NORMAL)
-    if uv is not None:
-        pieces += rows_text(f"vt {NUMBER} {NUMBER}\n", uv.values)
-    if normals is not None:
-        pieces += rows_text("vn %.7g %.7g %.7g\n", normals.values)
-    pieces += _faces_text(mesh, uv, normals, first)
-    return b"".join(pieces)
+    file.writelines(rows_text(f"v{f' {NUMBER}' * rows.shape[1]}\n", rows))
+    layers = [mesh.layers.get(name) for name in (UV, NORMAL)]
+    for layer, form in zip(layers, (f"vt {NUMBER} {NUMBER}\n", "vn %.7g %.7g %.7g\n"), strict=True):
+        if layer is not None:
+            file.writelines(rows_text(form, layer.values))
+    file.writelines(_faces_text(mesh, layers, first))
+    return file.getvalue()
 
 
 def _faces_text(
-    mesh: MeshFile, uv: Layer | None, normals: Layer | None, said_object: int
+    mesh: MeshFile, layers: Sequence[Layer | None], said_object: int
 ) -> Iterator[bytes]:
-    sizes = mesh.sizes
-    has_uv, has_normal = (_of_faces(mesh, layer) for layer in (uv, normals))
+    """Write faces, run by run of those with the same names and the same kinds of references."""
+    count = len(mesh.sizes)
+    named = [_of_faces(mesh, layer) for layer in layers]
     labels = {kind: label.of_face for kind, label in mesh.labels.items()}
-    state = np.stack([has_uv, has_normal, *labels.values()], axis=1).astype(np.int64)
-    turns = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
-    bounds = [0, *turns.tolist(), len(sizes)]
+    turns = np.zeros(max(count - 1, 0), dtype=bool)
+    for column in (*named, *labels.values()):
+        turns |= column[1:] != column[:-1]
+    bounds = [0, *(np.flatnonzero(turns) + 1).tolist(), count]
     said = dict.fromkeys(labels, NONE) | {OBJECT: said_object}
+    rows = [_WITHOUT if layer is None else layer.rows for layer in layers]
+    columns = [np.ascontiguousarray(column, np.int64) for column in (mesh.corners, *rows)]
+    digits = sum(1 + len(str(column.max(initial=0) + 1)) for column in columns)
     for begin, end in pairwise(bounds):
         for kind, of_face in labels.items():
             number = int(of_face[begin])
@@ -332,38 +340,22 @@ def _faces_text(
                 name = mesh.labels[kind].names[number] if number >= 0 else _NAMELESS[kind]
                 yield STATEMENTS[kind] + f" {name}\n".encode(mesh.encoding)
                 said[kind] = number
-        yield from _run_text(
-            mesh, begin, end, uv if has_uv[begin] else None, normals if has_normal[begin] else None
-        )
+        given = [columns[0]]
+        for column, of_face in zip(columns[1:], named, strict=True):
+            given.append(column if of_face[begin] else _WITHOUT)
+        for start in range(begin, end, BLOCK):
+            stop = min(start + BLOCK, end)
+            longest = 2 * (stop - start) + digits * int(mesh.offsets[stop] - mesh.offsets[start])
+            out = np.empty(longest, dtype=np.int8)
+            yield out[: write_faces(mesh.offsets, start, stop, *given, out)].tobytes()
 
 
+_WITHOUT = np.zeros(0, dtype=np.int64)
 _NAMELESS = {MATERIAL: "none", GROUP: "default", OBJECT: "default", SMOOTHING: "off"}
-
-
-def _run_text(
-    mesh: MeshFile, begin: int, end: int, uv: Layer | None, normals: Layer | None
-) -> Iterator[bytes]:
-    """Write faces that all have the same kinds of references."""
-    form = " %d" + ("/%d" if uv is not None else "/" if normals is not None else "")
-    form += "/%d" if normals is not None else ""
-    columns = [mesh.corners, *(layer.rows for layer in (uv, normals) if layer is not None)]
-    sizes = mesh.sizes
-    if (sizes[begin:end] == sizes[begin]).all():
-        size, share = int(sizes[begin]), slice(mesh.offsets[begin], mesh.offsets[end])
-        numbers = np.stack([column[share] + 1 for column in columns], axis=1)
-        yield from rows_text(f"f{form * size}\n", numbers.reshape(end - begin, -1))
-        return
-    for start in range(begin, end, BLOCK):
-        stop = min(start + BLOCK, end)
-        share = slice(mesh.offsets[start], mesh.offsets[stop])
-        numbers = np.stack([column[share] + 1 for column in columns], axis=1)
-        forms = {size: f"f{form * size}\n" for size in np.unique(sizes[start:stop]).tolist()}
-        text = "".join(forms[size] for size in sizes[start:stop].tolist())
-        yield (text % tuple(numbers.reshape(-1).tolist())).encode()
 
 
 def _of_faces(mesh: MeshFile, layer: Layer | None) -> Bool[np.ndarray, " F"]:
     """Return which faces have a value at every corner."""
-    if layer is None:
-        return np.zeros(len(mesh.sizes), dtype=bool)
+    if layer is None or layer.rows.min() >= 0:
+        return np.full(len(mesh.sizes), layer is not None)
     return np.logical_and.reduceat(layer.rows >= 0, mesh.offsets[:-1])

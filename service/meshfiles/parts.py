@@ -8,9 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from pns_common.mesh.rows import distinct_rows, marked, number_by_first_appearance, unit
+from pns_common.mesh.rows import (
+    distinct_rows,
+    first_places,
+    marked,
+    number_by_first_appearance,
+    unit,
+)
 from pns_common.schemes.matrix import SubdivisionMatrix
 
+from ..changes import Change
 from ..gltf.constants import FLOAT
 from ..gltf.read.primitives import TrianglePrimitive
 from ..gltf.read.schema import Accessor
@@ -18,7 +25,6 @@ from ..gltf.refine.attributes import RefinedPrimitive
 from ..gltf.refine.selection import check_chosen
 from ..meshes.weld import canonical_zero
 from ..options import Options
-from ..report import Change
 from .mesh_file import (
     GROUP,
     MATERIAL,
@@ -29,6 +35,7 @@ from .mesh_file import (
     Labels,
     Layer,
     MeshFile,
+    dropped,
     joined_layer,
     shown,
 )
@@ -90,7 +97,7 @@ def parts_of(mesh: MeshFile) -> tuple[list[Part], list[Change]]:
         material = NONE if materials is None else int(materials.of_face[place])
         primitive = _primitive(mesh, faces, number, lost)
         parts.append(Part(primitive, faces, material))
-    return parts, [Change("", f"{what} dropped", faces) for what, faces in lost.items()]
+    return parts, [*dropped(lost)]
 
 
 def kinds_of(mesh: MeshFile) -> Int[np.ndarray, " F"]:
@@ -117,7 +124,7 @@ def _primitive(
         else:
             layers[name] = Layer(layer.values, rows)
     vertex = mesh.corners[corners]
-    row, first = distinct_corners(vertex, layers)
+    row, first = number_by_first_appearance(corner_labels(vertex, layers))
     attributes = {"POSITION": mesh.vertices[vertex[first]]}
     for name, layer in layers.items():
         values = layer.values[layer.rows[first]]
@@ -130,17 +137,15 @@ def _primitive(
     return TrianglePrimitive(number, vertex[first], row.reshape(-1, 3), attributes, accessors)
 
 
-def distinct_corners(
-    vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]
-) -> tuple[Int[np.ndarray, " C"], Int[np.ndarray, " R"]]:
-    """Give corners numbers by vertex and rows of layers; return also where each comes first."""
+def corner_labels(vertex: Int[np.ndarray, " C"], layers: dict[str, Layer]) -> Int[np.ndarray, " C"]:
+    """Return labels that corners share which have one vertex and one row of each layer."""
     columns = [vertex]
     for layer in layers.values():
         if not any(np.array_equal(layer.rows, column) for column in columns):
             columns.append(layer.rows)
     if all(_follows(column, columns[-1]) for column in columns[:-1]):
-        return number_by_first_appearance(columns[-1])
-    return number_by_first_appearance(distinct_rows(np.stack(columns, axis=1)))
+        return columns[-1]
+    return number_by_first_appearance(distinct_rows(np.stack(columns, axis=1)))[0]
 
 
 def _follows(column: Int[np.ndarray, " C"], other: Int[np.ndarray, " C"]) -> bool:
@@ -157,7 +162,10 @@ def with_vertex_layers(mesh: MeshFile, names: Sequence[str]) -> MeshFile:
     layers = {name: layer for name, layer in mesh.layers.items() if name in names}
     if all(np.array_equal(layer.rows, mesh.corners) for layer in layers.values()):
         return mesh
-    row, first = distinct_corners(mesh.corners, layers)
+    row = corner_labels(mesh.corners, layers)
+    first = first_places(row, int(row.max(initial=-1)) + 1)
+    if (first < 0).any():
+        row, first = number_by_first_appearance(row)
     kept = {name: Layer(layer.values[layer.rows[first]], row) for name, layer in layers.items()}
     return replace(
         mesh,

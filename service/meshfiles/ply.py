@@ -13,7 +13,7 @@ from struct import unpack_from
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int, Shaped, UInt8
 
 from ..errors import UnreadableError
 from .mesh_file import (
@@ -401,7 +401,7 @@ def write_ply(mesh: MeshFile) -> bytes:
     head += [f"property {_NAMES[kind]} {name}" for name, kind in fields]
     faces = _face_bytes(mesh, count, fields, columns)
     header = "\n".join([*head, "end_header\n"]).encode(mesh.encoding)
-    return b"".join([header, vertex.tobytes(), faces])
+    return b"".join([header, vertex.data, faces.data])
 
 
 def _names_of(layer: str, width: int) -> tuple[str, ...]:
@@ -419,31 +419,32 @@ def _names_of(layer: str, width: int) -> tuple[str, ...]:
 
 def _records(
     fields: list[tuple[str, str]], columns: list[np.ndarray], rows: int
-) -> Shaped[np.ndarray, " N"]:
+) -> UInt8[np.ndarray, "N B"]:
+    """Return rows of columns as the bytes of each."""
     kinds = [(f"c{place}", f"<{kind}") for place, (_, kind) in enumerate(fields)]
     table = np.zeros(rows, dtype=kinds)
     for (name, _), column in zip(kinds, columns, strict=True):
         table[name] = column
-    return table
+    return table.view(np.uint8).reshape(rows, -1)
 
 
 def _face_bytes(
     mesh: MeshFile, count: str, fields: list[tuple[str, str]], columns: list[np.ndarray]
-) -> bytes:
+) -> UInt8[np.ndarray, "..."]:
     """Write polygons: how many corners, the corners, and what faces have beside them."""
     sizes = mesh.sizes
+    if (sizes == sizes[0]).all():
+        kinds = [("", count), *[("", "i4")] * int(sizes[0]), *fields]
+        corners = mesh.corners.reshape(len(sizes), -1)
+        return _records(kinds, [sizes, *corners.T, *columns], len(sizes))
     beside = np.dtype(count).itemsize + sum(np.dtype(kind).itemsize for _, kind in fields)
     starts = offsets_of(beside + 4 * sizes)
     content = np.empty(starts[-1], dtype=np.uint8)
-    for size in np.flatnonzero(np.bincount(sizes)).tolist():
+    for size in np.unique(sizes).tolist():
         kinds = [("", count), *[("", "i4")] * size, *fields]
         chosen = np.flatnonzero(sizes == size)
-        if len(chosen) == len(sizes):
-            corners = mesh.corners.reshape(-1, size)
-            return _records(kinds, [sizes, *corners.T, *columns], len(sizes)).tobytes()
         corners = mesh.corners[mesh.offsets[chosen, None] + np.arange(size)]
         rows = [sizes[chosen], *corners.T, *(column[chosen] for column in columns)]
         table = _records(kinds, rows, len(chosen))
-        table = table.view(np.uint8).reshape(len(chosen), -1)
         content[starts[chosen, None] + np.arange(table.shape[1])] = table
-    return content.tobytes()
+    return content

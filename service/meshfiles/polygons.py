@@ -13,9 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pns_common.carry import rules
-from pns_common.carry.carried import Column, in_type_of, refine_column
-from pns_common.carry.charts import chart_points, charts_of, refine_charts
-from pns_common.carry.columns import level_topologies
+from pns_common.carry.carried import Carrier, Column
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh, fans
 from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals, smooth_fans
@@ -29,13 +27,14 @@ from pns_common.report import Report
 from pns_common.schemes import CATMULL_CLARK
 
 from ..advice import Bends, count_bends
+from ..changes import Change, counted
 from ..errors import UnrefinableError
 from ..gltf.refine.changes import near_miss_changes, near_misses
-from ..gltf.refine.mesh_refine import GATE, RATIO, creases_by_shape
+from ..gltf.refine.mesh_refine import GATE, RATIO
 from ..gltf.refine.normals import safe_unit
+from ..meshes.creases import chosen_creases, hard_edges
 from ..meshes.weld import Weld, weld, weld_by_label, weld_within
 from ..options import Options
-from ..report import Change
 from ..stages import Stages
 from .mesh_file import COLOUR, NONE, NORMAL, UV, Labels, Layer, MeshFile, offsets_of
 from .parts import chosen_of
@@ -125,10 +124,10 @@ def refine_polygons(
         refined = replace(refined, parents=parents)
     (misses,) = near_misses(control.mesh.vertices, made.topologies[0], [made.reference_length])
     told = {
-        "vertices joined within weld_tolerance": control.near,
-        "repeated corners dropped": int(mesh.sizes[control.faces].sum()) - len(control.places),
+        "joined": control.near,
+        "repeated-corners": int(mesh.sizes[control.faces].sum()) - len(control.places),
     }
-    changes = [Change("", what, count) for what, count in told.items() if count]
+    changes = counted(told)
     refined_faces = np.isin(np.repeat(np.arange(len(mesh.sizes)), mesh.sizes), control.faces)
     return Refined(
         mesh=refined,
@@ -174,9 +173,7 @@ def _welded(mesh: MeshFile, options: Options) -> tuple[Weld, int]:
 
 
 def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme) -> Creases:
-    if options.crease == "normals":
-        return Creases(_hard_edges(control, mesh), border=options.border)
-    found = replace(creases_by_shape(control.mesh, options, scheme), border=options.border)
+    found = chosen_creases(control.mesh, options, scheme, lambda: _hard_edges(control, mesh))
     if options.crease != "auto" or mesh.tags is None:
         return found
     vertex_of = np.full(len(mesh.vertices), NONE)
@@ -185,30 +182,25 @@ def _creases(control: _Control, mesh: MeshFile, options: Options, scheme: Scheme
 
 
 def _hard_edges(control: _Control, mesh: MeshFile) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges whose two faces carry different normals at both ends."""
+    """Return the edges that normals make hard; a corner without one makes none so."""
     normals = mesh.layers.get(NORMAL)
-    topology = control.mesh.topology()
-    edges = topology.edges[topology.interior].astype(np.int64)
     if normals is None:
-        return edges[:0]
-    row = distinct_rows(normals.values)[normals.rows[control.places]]
-    row[normals.rows[control.places] < 0] = NONE
-    there, back = topology.half_edges[topology.interior].T
-    follow = following(control.mesh.offsets)
-    hard = np.ones(len(edges), dtype=bool)
-    for one, other in ((there, follow[back]), (follow[there], back)):
-        hard &= (row[one] >= 0) & (row[other] >= 0) & (row[one] != row[other])
-    return edges[hard]
+        return np.zeros((0, 2), dtype=np.int64)
+    label = distinct_rows(normals.values)
+    label[~normals.values.any(axis=1)] = NONE
+    rows = normals.rows[control.places]
+    return hard_edges(control.mesh.topology(), np.where(rows < 0, NONE, label[rows]))
 
 
 def _with_layers(mesh: MeshFile, control: _Control, made: Refinement, options: Options) -> MeshFile:
     """Return the refined mesh with all that the file's corners and faces carry."""
     corners, selected = made.mesh.corners, made.selected
-    counts = np.diff(control.mesh.offsets) * 4 ** (options.levels - 1)
-    of_face = np.repeat(control.faces, counts)
-    layers: dict[str, Layer] = {}
-    for name, layer in mesh.layers.items():
-        layers[name] = _refined(name, layer, control, made, options)
+    carrier = Carrier(made.topologies, CATMULL_CLARK, options.limit, Blocks(available_threads()))
+    of_face = control.faces[carrier.face_parents]
+    layers = {
+        name: _refined(name, layer, control, carrier, options)
+        for name, layer in mesh.layers.items()
+    }
     still = np.zeros(0, dtype=np.int64)
     if selected is not None:
         of_face = of_face[selected.places[selected.offsets[:-1]] // 4]
@@ -268,35 +260,25 @@ def _with(
 
 
 def _refined(
-    name: str, layer: Layer, control: _Control, made: Refinement, options: Options
+    name: str, layer: Layer, control: _Control, carrier: Carrier, options: Options
 ) -> Layer:
     """Refine values at corners: corners of one vertex with one value stay one."""
     rows = layer.rows[control.places]
-    values, mesh, blocks = layer.values, control.mesh, Blocks(available_threads())
-    bare = np.logical_or.reduceat(rows < 0, mesh.offsets[:-1])
+    values = layer.values[np.maximum(rows, 0)]
     if name == UV and options.uv == "smooth":
-        points, first = chart_points(mesh.corners, values[np.maximum(rows, 0)])
-        charts = charts_of(points, made.topologies, CATMULL_CLARK, blocks)
-        column = values[np.maximum(rows[first], 0)].astype(np.float64)
-        column, corners = refine_charts(column, charts, CATMULL_CLARK, blocks, limit=options.limit)
-        column = in_type_of(values, column)
+        column = Column(values, rules.smooth)
     else:
-        label = distinct_rows(np.stack([mesh.corners, rows], axis=1))
-        points, first = number_by_first_appearance(label)
         whole = values.dtype.kind != "f" and name != COLOUR
-        faces = points, mesh.offsets
-        charts = level_topologies(faces, len(first), options.levels, base=CATMULL_CLARK)
-        own = Column(values[np.maximum(rows[first], 0)], rules.nearest if whole else rules.linear)
-        column = refine_column(own, charts, CATMULL_CLARK)
-        corners = CATMULL_CLARK.faces(charts[-1], blocks, np.int64)
-    corners = corners.reshape(-1)
-    if bare.any():
-        counts = 4 * np.diff(mesh.offsets) * 4 ** (options.levels - 1)
-        bare = np.repeat(bare, counts)
-        used, inside = np.unique(corners[~bare], return_inverse=True)
-        column, corners = column[used], np.full(len(corners), NONE)
-        corners[~bare] = inside
-    return Layer(column, corners)
+        column = Column(values, rules.nearest if whole else rules.linear, same=rows[:, None])
+    values, corners = carrier.at_points(column)
+    bare = np.logical_or.reduceat(rows < 0, control.mesh.offsets[:-1])
+    if not bare.any():
+        return Layer(values, corners)
+    bare = np.repeat(bare[carrier.face_parents], 4)
+    used, inside = np.unique(corners[~bare], return_inverse=True)
+    corners = np.full(len(corners), NONE)
+    corners[~bare] = inside
+    return Layer(values[used], corners)
 
 
 def _normals(mesh: Mesh, groups: Int[np.ndarray, " C"]) -> Layer:

@@ -161,16 +161,19 @@ def _stated(mesh: MeshFile, options: Options) -> Callable[[ControlMesh, Creases]
     return creases
 
 
-def faces_after(mesh: MeshFile, levels: int) -> int:
-    """Return how many faces a mesh file becomes: four of a triangle, a quad for each corner."""
-    if (mesh.sizes == 3).all():
-        return len(mesh.sizes) * 4**levels
-    return len(mesh.corners) * 4 ** (levels - 1)
+def faces_after(mesh: MeshFile, options: Options) -> int:
+    """Return how many faces a mesh file becomes: four of a triangle, a quad for each corner.
+
+    Goals cut polygons into triangles.
+    """
+    if options.goals or (mesh.sizes == 3).all():
+        return options.faces_after(len(mesh.corners) - 2 * len(mesh.sizes))
+    return len(mesh.corners) * 4 ** (options.levels - 1)
 
 
 def check_faces(mesh: MeshFile, options: Options, limits: Limits) -> int:
     """Check and return the number of refined faces. Raises LimitError."""
-    faces = faces_after(mesh, options.levels)
+    faces = faces_after(mesh, options)
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
     return faces
 

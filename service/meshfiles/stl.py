@@ -7,8 +7,8 @@ from jaxtyping import Float, Int, UInt16
 
 from pns_common.mesh.rows import cross, norm
 
+from ..changes import Change, counted
 from ..errors import UnreadableError, quoted
-from ..report import Change
 from .mesh_file import MeshFile, offsets_of
 from .text import cut_text, plain_text
 
@@ -70,12 +70,11 @@ def _of_binary(data: bytes) -> tuple[Float[np.ndarray, "N 3"], tuple[Change, ...
         said, facet = count, FACET.newbyteorder(">")
     facets = np.frombuffer(data, facet, count, HEADER)
     told = {
-        "bytes behind the last facet left out": left,
-        "colours of faces dropped": _count_colours(data[: HEADER - 4], facets["attribute"]),
-        f"count of facets corrected: the file says {said}": int(said != count),
+        "facet-tail": left,
+        ("dropped", "colours of faces"): _count_colours(data[: HEADER - 4], facets["attribute"]),
+        ("facet-count", str(said)): int(said != count),
     }
-    changes = tuple(Change("", what, many) for what, many in told.items() if many)
-    return facets["corners"].reshape(-1, 3).astype(np.float64), changes
+    return facets["corners"].reshape(-1, 3).astype(np.float64), tuple(counted(told))
 
 
 def _count_colours(header: bytes, attributes: UInt16[np.ndarray, " F"]) -> int:
@@ -115,8 +114,7 @@ def _of_text(
     whole = b"solid" in rest
     if sizes.sum() < len(vertex) or (not whole and b"facet" in rest.replace(b"endfacet", b"")):
         raise UnreadableError("the STL file is cut off: it ends within a facet")
-    told = "end of the last solid missing: the file may be cut off"
-    return points, sizes, () if whole else (Change("", told, 1),)
+    return points, sizes, tuple(counted({"solid-open": int(not whole)}))
 
 
 def write_stl(mesh: MeshFile) -> bytes:

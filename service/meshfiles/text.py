@@ -19,8 +19,6 @@ from ..errors import UnreadableError
 NUMBER = "%.12g"
 # Rows of text that are made at a time.
 BLOCK = 2**14
-# What is written in bulk: other numbers are few.
-SMALLEST, LARGEST = 1e-10, 1e22
 POWERS, WHOLES = 10.0 ** np.arange(23), 10 ** np.arange(17)
 _DIGITS = {"%.7g": 7, NUMBER: 12}
 _PLACE = re.compile(r"%[#.\d]*[dg]")
@@ -247,22 +245,22 @@ def rows_text(form: str, rows: Shaped[np.ndarray, "N K"]) -> Iterator[bytes]:
     kinds, parts = _PLACE.findall(form), [part.encode() for part in _PLACE.split(form)]
     letters = np.frombuffer(b"".join(parts), dtype=np.int8)
     between = letters, np.cumsum([len(part) for part in parts])
-    end = np.zeros(1, dtype=np.int64)
     kind = kinds[0] if len(set(kinds)) == 1 else ""
-    for begin in range(0, len(rows), BLOCK):
-        block = rows[begin : begin + BLOCK] + 0  # no −0
-        size = np.abs(block)
-        if kind == "%d" and block.dtype.kind in "iu" and block.min() >= 0:
-            longest = len(str(int(block.max())))
-            out = np.empty(len(block) * (len(letters) + longest * len(kinds)), dtype=np.int8)
-            kernels.write_wholes(np.ascontiguousarray(block, np.int64), *between, out, end)
-        elif kind in _DIGITS and ((size == 0) | ((size >= SMALLEST) & (size < LARGEST))).all():
-            digits = _DIGITS[kind]
-            # Beside its digits a number has a sign, a point, and four zeros or an exponent.
-            out = np.empty(len(block) * (len(letters) + (digits + 7) * len(kinds)), dtype=np.int8)
-            numbers = np.ascontiguousarray(block, np.float64)
-            kernels.write_numbers(numbers, digits, *between, POWERS, WHOLES, out, end)
-        else:
-            yield (form * len(block) % tuple(block.reshape(-1).tolist())).encode()
-            continue
-        yield out[: end[0]].tobytes()
+    whole = kind == "%d" and rows.dtype.kind in "iu"
+    # A whole number has 19 digits at most; others a sign, a point, and zeros or an exponent.
+    longest = 19 if whole else _DIGITS.get(kind, 0) + 7
+    out = np.empty(min(BLOCK, len(rows)) * (len(letters) + longest * len(kinds)), dtype=np.int8)
+    begin = 0
+    while begin < len(rows):
+        block, count, end = rows[begin : begin + BLOCK], 0, 0
+        if whole:
+            given = np.ascontiguousarray(block, np.int64)
+            count, end = kernels.write_wholes(given, *between, out)
+        elif kind in _DIGITS:
+            given = np.ascontiguousarray(block, np.float64)
+            count, end = kernels.write_numbers(given, _DIGITS[kind], *between, POWERS, WHOLES, out)
+        yield out[:end].tobytes()
+        begin += count
+        if count < len(block):
+            yield (form % tuple((rows[begin] + 0).tolist())).encode()  # no −0
+            begin += 1

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pns_common.mesh.cutting import BLOCK, Cut, convex_pieces, cut_polygons, newell
 
-from ..report import Change
+from ..changes import counted
 from .mesh_file import MeshFile, offsets_of
 
 
@@ -23,25 +23,17 @@ def triangulated(mesh: MeshFile) -> MeshFile:
     polygon = polygon[order]
     places = np.concatenate([cut.places for cut in cuts])[order]
     crossed = sum(cut.crossed for cut in cuts)
-    told = {
-        "triangles added by cutting polygons": len(polygon) - len(mesh.sizes),
-        "polygons without an area or that cross themselves: their triangles may overlap": crossed,
-    }
-    changes = [Change("", what, count) for what, count in told.items() if count]
-    return mesh.cut(places, polygon).with_changes(changes)
+    told = {"polygons-cut": len(polygon) - len(mesh.sizes), "polygons-crossed": crossed}
+    return mesh.cut(places, polygon).with_changes(counted(told))
 
 
 def in_star_shaped_pieces(mesh: MeshFile) -> MeshFile:
     """Return polygons with the concave ones in convex pieces; see ``pns_common.mesh.cutting``."""
     pieces = convex_pieces(mesh.vertices, mesh.offsets, mesh.corners)
-    told = {
-        "concave polygons cut into convex pieces": pieces.cut,
-        "polygons that cross themselves: their quads may overlap": pieces.crossed,
-    }
-    changes = [Change("", what, count) for what, count in told.items() if count]
+    told = {"concave-cut": pieces.cut, "concave-crossed": pieces.crossed}
     if pieces.cut:
         mesh = mesh.taken(pieces.offsets, pieces.places, pieces.face)
-    return mesh.with_changes(changes)
+    return mesh.with_changes(counted(told))
 
 
 def cut_blocks(mesh: MeshFile) -> Iterator[Cut]:

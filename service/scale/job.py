@@ -6,6 +6,8 @@ import hashlib
 import posixpath
 import time
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -126,12 +128,10 @@ def failed(path: str, output: str, error: Exception) -> Row:
 
 
 def _refine(task: Task) -> Row:
-    from pns_common.errors import PnsError
-
     from ..bodies.sibling_files import Opened
-    from ..memory_cap import memory_cap
+    from ..changes import lines_of, with_changes
     from ..meshfiles.companions import companions, copied
-    from ..meshfiles.convert import converted, lines_of, with_changes
+    from ..meshfiles.convert import converted
     from .places import place_of
 
     source, output = place_of(task.url), place_of(task.output)
@@ -139,26 +139,9 @@ def _refine(task: Task) -> Row:
     digest = input_hash(data, task.kind, siblings, task.limits)
     if _is_done(task.known, digest, output):
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
-    model = _model(task.model) if task.options.learns else None
-    if (None if model is None else model.hash) != task.model_hash:
-        raise NoModelError(
-            f"{task.model or 'the default model'}: it is not the model that this run began with; "
-            "it was replaced, or is another one on a worker's machine"
-        )
-    most = task.limits.max_memory_bytes
-    try:
-        with memory_cap(most, f"refining took more than {most} bytes"):
-            written = converted(
-                data,
-                task.kind,
-                task.target,
-                task.options,
-                model,
-                task.limits,
-                siblings=siblings,
-            )
-    except PnsError as error:
-        raise ServiceError(str(error), code="unrefinable") from error
+    with _refining(task) as model:
+        asked = task.options, model, task.limits
+        written = converted(data, task.kind, task.target, *asked, siblings=siblings)
     report = written.report
     if task.kind == task.target:
         folder = output.folder
@@ -187,24 +170,53 @@ def _refine(task: Task) -> Row:
 
 
 def _plan(task: Task) -> Row:
-    """Return what refining would cost: the faces, found without refining."""
+    """Return how many faces the refined file will have; nothing is written."""
     from ..meshfiles.convert import predicted_faces
     from .places import place_of
 
     source = place_of(task.url)
     data, siblings = source.read(), source.siblings()
     digest = input_hash(data, task.kind, siblings, task.limits)
-    faces = predicted_faces(data, task.kind, task.options, task.limits, siblings)
-    status = SKIPPED if _is_done(task.known, digest, place_of(task.output)) else PLANNED
+    if _is_done(task.known, digest, place_of(task.output)):
+        return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
+    with _refining(task) as model:
+        asked = task.options, model, task.limits, siblings
+        faces_in, faces = predicted_faces(data, task.kind, *asked)
     return Row(
         task.url,
         task.output,
-        status,
-        faces_in=faces // 4**task.options.levels,
+        PLANNED,
+        faces_in=faces_in,
         faces_out=faces,
         bytes_in=len(data),
         input_sha256=digest,
     )
+
+
+@contextmanager
+def _refining(task: Task) -> Iterator[Model | None]:
+    """Yield the model of a task, and hold what is done with it to its memory.
+
+    Raises:
+        NoModelError: it is not the model that the run began with.
+        ServiceError: the file cannot be refined.
+    """
+    from pns_common.errors import PnsError
+
+    from ..memory_cap import memory_cap
+
+    model = _model(task.model) if task.options.learns else None
+    if (None if model is None else model.hash) != task.model_hash:
+        raise NoModelError(
+            f"{task.model or 'the default model'}: it is not the model that this run began with; "
+            "it was replaced, or is another one on a worker's machine"
+        )
+    most = task.limits.max_memory_bytes
+    try:
+        with memory_cap(most, f"refining took more than {most} bytes"):
+            yield model
+    except PnsError as error:
+        raise ServiceError(str(error), code="unrefinable") from error
 
 
 def _is_done(known: Known | None, input_hash: str, output: Place) -> bool:

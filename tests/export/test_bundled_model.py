@@ -18,8 +18,7 @@ from train.metrics.envelope import envelope_limit
 from train.metrics.one_step import improvements_as_data
 from train.models.checkpoint import Checkpoint, save_checkpoint
 from train.models.from_recipe import initial_directed, initial_network
-from train.models.recipe import of_length
-from train.models.recipes import RECIPES, paper, signed
+from train.models.recipes import RECIPES, paper
 from train.models.torch_model import recipe_model
 
 PERCENT_POINTS = 0.01
@@ -108,20 +107,6 @@ def weights(path):
     tensors = onnx.load(path).graph.initializer
     names = ("weight", "bias")
     return {t.name: t.raw_data for t in tensors if t.name.startswith(names)}
-
-
-def test_a_recipe_makes_the_same_file_twice(tmp_path):
-    """The way of the bundled files, in a few steps: train, measure, keep, export."""
-    files = []
-    for number in range(2):
-        recipe = of_length(signed(3), 4)
-        network = fit(recipe, lambda done, loss: None).network
-        metrics = {"ridge-held-out": {"distance": {"percent": 1.0}}}
-        path = tmp_path / f"{number}.safetensors"
-        save_checkpoint(path, Checkpoint(recipe, network, metrics, machine_fingerprint()))
-        assert export_command(path, tmp_path / f"{number}.onnx").exit_code == 0
-        files.append((tmp_path / f"{number}.onnx").read_bytes())
-    assert files[0] == files[1]
 
 
 def untrained(recipe):

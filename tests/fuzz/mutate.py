@@ -1,14 +1,9 @@
 """Break a file: bits and lengths anywhere, values inside its JSON, its compressed data alone."""
 
-from __future__ import annotations
-
 import json
-import random
 import struct
-from typing import Any
 
 from service.bodies.media import FORMATS, GLB, GLTF
-from tests.fuzz.seeds import Seed
 
 NUMBERS = [-1, 0, 1, 2, 3, 4, 5, 7, 12, 100, 252, 5121, 5126, 65535, 2**31, 2**32 - 1, 2**53, 2**70]
 VALUES = [*NUMBERS, 0.5, -1e308, None, True, "", "POSITION", "data:,", "../x", [], [0], {}]
@@ -20,7 +15,7 @@ WORDS = [
 ]
 
 
-def mutated(seed: Seed, rng: random.Random) -> bytes:
+def mutated(seed, rng):
     """One malformed body (now and then one that is still right)."""
     ways = [_flipped, _overwritten, _cut, _doubled]
     if seed.content_type in (GLB, GLTF):
@@ -33,14 +28,14 @@ def mutated(seed: Seed, rng: random.Random) -> bytes:
     return rng.choice(ways)(seed.body, rng)
 
 
-def _flipped(body: bytes, rng: random.Random) -> bytes:
+def _flipped(body, rng):
     data = bytearray(body)
     for _ in range(rng.choice([1, 1, 2, 8, 64])):
         data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
     return bytes(data)
 
 
-def _overwritten(body: bytes, rng: random.Random) -> bytes:
+def _overwritten(body, rng):
     data = bytearray(body)
     number = rng.choice([0, 1, 2**31 - 1, 2**32 - 1, rng.getrandbits(32)])
     byte = rng.randrange(max(1, len(data) - 4))
@@ -48,18 +43,18 @@ def _overwritten(body: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-def _cut(body: bytes, rng: random.Random) -> bytes:
+def _cut(body, rng):
     return body[: rng.randrange(len(body))]
 
 
-def _doubled(body: bytes, rng: random.Random) -> bytes:
+def _doubled(body, rng):
     start = rng.randrange(len(body))
     end = min(len(body), start + rng.choice([1, 4, 64, 1024]))
     byte = rng.randrange(len(body))
     return body[:byte] + body[start:end] + body[byte:]
 
 
-def _reworded(body: bytes, rng: random.Random) -> bytes:
+def _reworded(body, rng):
     """Replace words of a text, or of a binary file's head."""
     head, rest = (body, b"") if body.isascii() else (body[:400], body[400:])
     words = head.split(b" ")
@@ -68,7 +63,7 @@ def _reworded(body: bytes, rng: random.Random) -> bytes:
     return b" ".join(words) + rest
 
 
-def _binary_only(body: bytes, rng: random.Random) -> bytes:
+def _binary_only(body, rng):
     """Break the BIN chunk, where compressed data lie, and leave the JSON whole."""
     start = 20 + struct.unpack_from("<I", body, 12)[0] + 8
     if start >= len(body):
@@ -81,7 +76,7 @@ def _binary_only(body: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-def _edited(body: bytes, rng: random.Random) -> bytes:
+def _edited(body, rng):
     binary = body[:4] == b"glTF"
     end = 20 + struct.unpack_from("<I", body, 12)[0] if binary else len(body)
     tree = json.loads(body[20:end] if binary else body)
@@ -105,7 +100,7 @@ def _edited(body: bytes, rng: random.Random) -> bytes:
     return header + struct.pack("<I4s", len(text), b"JSON") + text + rest
 
 
-def _places(value: Any) -> Any:
+def _places(value):
     """Every (container, key) of a JSON tree; long strings are left alone."""
     keys = list(value) if isinstance(value, dict) else range(len(value))
     for key in keys:

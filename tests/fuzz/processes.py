@@ -1,18 +1,15 @@
 """Share a run among processes: a crash ends one of them, and is found out."""
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 import tempfile
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from tests.fuzz.run import Tally, run
 from tests.fuzz.seeds import seeds
 
 
-def in_processes(jobs: list[tuple[Path | None, int, float, int, Path]]) -> list[Tally]:
+def in_processes(jobs):
     """Each job in a process of its own; one that dies leaves its input behind and a fault."""
     context = multiprocessing.get_context("spawn")
     running = []
@@ -36,14 +33,7 @@ def in_processes(jobs: list[tuple[Path | None, int, float, int, Path]]) -> list[
     return tallies
 
 
-def _work(
-    sender: Connection,
-    folder: Path | None,
-    count: int,
-    seconds: float,
-    start: int,
-    kept: Path,
-) -> None:
+def _work(sender, folder, count, seconds, start, kept):
     # A library's warnings about each malformed body are no news here.
     logging.disable(logging.WARNING)
     sender.send(run(seeds(folder), count, seconds, start, kept))

@@ -6,7 +6,6 @@ import random
 import time
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from benchmarks.memory import peak_mib, reset_peak
 from pns_common.errors import MeshError
@@ -15,7 +14,6 @@ from service.errors import ServiceError
 from service.meshfiles.convert import converted
 from service.options import Limits, Options
 from tests.fuzz.mutate import mutated
-from tests.fuzz.seeds import Seed
 
 MIB = 2**20
 # What a malformed file leaves of itself is written in every way.
@@ -42,7 +40,7 @@ class Tally:
     faults: list[tuple[str, int, str]] = field(default_factory=list)
 
 
-def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | None) -> Tally:
+def run(seeds, count, seconds, start, kept):
     """Try `count` bodies, or as many as fit into `seconds`.
 
     Body `number` follows from its number alone, whatever ran before: (start + number) names it. The
@@ -78,7 +76,7 @@ def run(seeds: list[Seed], count: int, seconds: float, start: int, kept: Path | 
     return tally
 
 
-def outcome(seed: Seed, body: bytes, compress: str = "none") -> str:
+def outcome(seed, body, compress="none"):
     """ "refined", or the code of the refusal. Any other exception is a fault."""
     options = Options(levels=1, scheme="loop", compress=compress)
     try:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import DracoPy
 import meshopt
 import numpy as np
-import trimesh
 
 from service.bodies.media import GLB, GLTF, MEDIA_TYPES
 from service.meshfiles.formats import write
+from service.meshfiles.glb import as_gltf_json
 from service.meshfiles.mesh_file import of_triangles
+from service.options import Limits
 from tests.support.gltf import files
 from tests.support.gltf.shapes import box, octahedron
 
@@ -33,7 +32,7 @@ class Seed:
     body: bytes
 
 
-def seeds(folder: Path | None) -> list[Seed]:
+def seeds(folder):
     """Everything that a run starts from."""
     all_seeds = made()
     for path in sorted(folder.rglob("*.gl*")) if folder is not None else []:
@@ -43,40 +42,59 @@ def seeds(folder: Path | None) -> list[Seed]:
     return all_seeds
 
 
-def made() -> list[Seed]:
+def made():
     """Small files for each thing that the reader looks at."""
-    trees = {
-        "plain": plain(),
-        "sparse": sparse(),
-        "quantised": quantised(),
-        "strip": strip(),
-        "meshopt": compressed_views(),
-        "draco": draco(),
-        "skinned": skinned(),
-    }
-    gathered = [
-        Seed(name, GLB, files.pack(tree, bytes(binary))) for name, (tree, binary) in trees.items()
-    ]
-    gathered += [Seed(f"{name}.gltf", GLTF, embedded(*trees[name])) for name in trees]
-    return [*gathered, *mesh_files(), zipped(*trees["plain"]), multipart(*trees["plain"])]
+    all_seeds = []
+    for make in (plain, sparse, quantised, strip, compressed_views, draco, skinned):
+        tree, binary = make()
+        glb = files.pack(tree, bytes(binary))
+        all_seeds.append(Seed(make.__name__, GLB, glb))
+        all_seeds.append(Seed(f"{make.__name__}.gltf", GLTF, as_gltf_json(glb, Limits())))
+    return [*all_seeds, *mesh_files(), *of_two_files(*plain())]
+
+
+STL = "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n"
 
 
 def mesh_files():
     """Boxes in the other formats, text and binary, with what these have beside triangles."""
-    solid = trimesh.creation.box()
-    text = "".join(f"v {x} {y} {z}\n" for x, y, z in solid.vertices)
-    text += "".join(f"vt {n / 8} 0.5\n" for n in range(8)) + "usemtl a\n"
-    text += "".join("f " + " ".join(f"{v + 1}/{v + 1}" for v in f) + "\n" for f in solid.faces)
-    bodies = {
-        "obj": ("obj", f"# box\no part\n{text}f -4 -3 -2 -1\n".encode()),
-        "off": ("off", solid.export(file_type="off").encode() + b"\n"),
-        "ply": ("ply", bytes(solid.export(file_type="ply"))),
-        "text ply": ("ply", solid.export(file_type="ply", encoding="ascii")),
-        "stl": ("stl", bytes(solid.export(file_type="stl"))),
-        "text stl": ("stl", solid.export(file_type="stl_ascii").encode()),
-        "3mf": ("3mf", write(of_triangles(solid.vertices, solid.faces), "3mf")),
-    }
-    return [Seed(name, MEDIA_TYPES[kind], body) for name, (kind, body) in bodies.items()]
+    solid = of_triangles(box()["POSITION"], box()["indices"])
+    points = "".join(f"{x} {y} {z}\n" for x, y, z in solid.vertices)
+    faces = "".join(f"3 {a} {b} {c}\n" for a, b, c in solid.faces)
+    obj = "".join(f"v {line}\n" for line in points.splitlines())
+    obj += "".join(f"vt {n / 24} 0.5\n" for n in range(24)) + "usemtl a\n"
+    obj += "".join("f " + " ".join(f"{v + 1}/{v + 1}" for v in f) + "\n" for f in solid.faces)
+    stl = "".join(
+        STL.format("".join(f"vertex {x} {y} {z}\n" for x, y, z in corners))
+        for corners in solid.vertices[solid.faces].tolist()
+    )
+    head, _, _ = write(solid, "ply").partition(b"end_header\n")
+    text = head.replace(b"binary_little_endian", b"ascii") + b"end_header\n"
+    bodies = [
+        ("obj", f"# box\no part\n{obj}f -4 -3 -2 -1\n".encode()),
+        ("off", f"OFF\n24 12 0\n{points}{faces}\n".encode()),
+        ("ply", text + (points + faces).encode()),
+        ("stl", f"solid part\n{stl}endsolid part\n".encode()),
+        *((kind, write(solid, kind)) for kind in ("ply", "stl", "3mf")),
+    ]
+    return [Seed(f"{kind} {n}", MEDIA_TYPES[kind], body) for n, (kind, body) in enumerate(bodies)]
+
+
+def of_two_files(tree, binary):
+    """A document and its buffer, as an archive and as two parts."""
+    tree = json.loads(json.dumps(tree))
+    tree["buffers"][0]["uri"] = "box.bin"
+    text, binary = json.dumps(tree).encode(), bytes(binary)
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as opened:
+        opened.writestr("a/box.gltf", text)
+        opened.writestr("a/box.bin", binary)
+    body = b"".join(
+        b'--X\r\nContent-Disposition: form-data; name="%b"\r\n\r\n%b\r\n' % part
+        for part in ((b"file", text), (b"box.bin", binary))
+    )
+    yield Seed("zip", "application/zip", target.getvalue())
+    yield Seed("multipart", "multipart/form-data; boundary=X", body + b"--X--\r\n")
 
 
 def plain():
@@ -97,13 +115,11 @@ def sparse():
     tree, binary = files.document([octahedron(_VALUE=np.zeros((6, 2)))])
     rows = files.add_accessor(tree, binary, np.array([[1], [4]], dtype=np.uint8))
     values = files.add_accessor(tree, binary, np.ones((2, 3)))
-    places, replaced = (tree["accessors"][index] for index in (rows, values))
+    places, replaced = (tree["accessors"][index]["bufferView"] for index in (rows, values))
     attributes = tree["meshes"][0]["primitives"][0]["attributes"]
-    tree["accessors"][attributes["POSITION"]]["sparse"] = {
-        "count": 2,
-        "indices": {"bufferView": places["bufferView"], "componentType": 5121},
-        "values": {"bufferView": replaced["bufferView"]},
-    }
+    indices = {"bufferView": places, "componentType": 5121}
+    stored = {"count": 2, "indices": indices, "values": {"bufferView": replaced}}
+    tree["accessors"][attributes["POSITION"]]["sparse"] = stored
     del tree["accessors"][attributes["_VALUE"]]["bufferView"]
     tree["buffers"] = [{"byteLength": len(binary)}]
     return tree, binary
@@ -111,11 +127,10 @@ def sparse():
 
 def quantised():
     """Positions as 16-bit integers, normals as 8-bit fractions."""
-    shape = octahedron()
-    points = shape["POSITION"]
-    shape["POSITION"] = (1000 * points).astype(np.int16)
-    shape["NORMAL"] = files.Normalized((127 * points).astype(np.int8))
-    tree, binary = files.document([shape])
+    points = octahedron()["POSITION"]
+    normals = files.Normalized((127 * points).astype(np.int8))
+    whole = (1000 * points).astype(np.int16)
+    tree, binary = files.document([octahedron(POSITION=whole, NORMAL=normals)])
     tree["extensionsUsed"] = tree["extensionsRequired"] = ["KHR_mesh_quantization"]
     return tree, binary
 
@@ -123,77 +138,64 @@ def quantised():
 def strip():
     """A strip, and a fan without indices."""
     points = np.random.default_rng(0).random((8, 3))
-    return files.document(
-        [
-            {"POSITION": points, "indices": np.array([0, 1, 2, 3, 3, 4, 5, 6]), "mode": 5},
-            {"POSITION": points, "mode": 6},
-        ]
-    )
+    indices = np.array([0, 1, 2, 3, 3, 4, 5, 6])
+    strip = {"POSITION": points, "indices": indices, "mode": 5}
+    return files.document([strip, {"POSITION": points, "mode": 6}])
+
+
+def packed(parts):
+    """Bytes one after another at whole words, and where each lies."""
+    data, places = bytearray(), []
+    for part in parts:
+        places.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
+        data += part + b"\0" * (-len(part) % 4)
+    return data, places
 
 
 def compressed_views():
     """A box whose every view is compressed by meshopt."""
     tree, binary = files.document([box()])
-    packed = bytearray()
-    for number, view in enumerate(tree["bufferViews"]):
-        accessor = tree["accessors"][number]
+    parts, extensions = [], []
+    for accessor, view in zip(tree["accessors"], tree["bufferViews"], strict=True):
         stride = view["byteLength"] // accessor["count"]
         rows = np.frombuffer(binary, np.uint8, view["byteLength"], view["byteOffset"])
-        attributes = accessor["type"] != "SCALAR"
-        if attributes:
-            data = meshopt.encode_gltf_buffer(rows.reshape(-1, stride), "ATTRIBUTES")
-        else:
-            data = meshopt.encode_gltf_buffer(rows.view(np.uint16), "TRIANGLES")
+        mode = "TRIANGLES" if accessor["type"] == "SCALAR" else "ATTRIBUTES"
+        rows = rows.view(np.uint16) if mode == "TRIANGLES" else rows.reshape(-1, stride)
+        parts.append(meshopt.encode_gltf_buffer(rows, mode))
+        extensions.append({"byteStride": stride, "count": accessor["count"], "mode": mode})
         view["buffer"] = 1
-        view["extensions"] = {
-            "EXT_meshopt_compression": {
-                "buffer": 0,
-                "byteOffset": len(packed),
-                "byteLength": len(data),
-                "byteStride": stride,
-                "count": accessor["count"],
-                "mode": "ATTRIBUTES" if attributes else "TRIANGLES",
-            }
-        }
-        packed += data + b"\0" * (-len(data) % 4)
-    tree["buffers"] = [{"byteLength": len(packed)}, {"byteLength": len(binary)}]
+    data, places = packed(parts)
+    for view, extension, place in zip(tree["bufferViews"], extensions, places, strict=True):
+        view["extensions"] = {"EXT_meshopt_compression": place | extension}
+    tree["buffers"] = [{"byteLength": len(data)}, {"byteLength": len(binary)}]
     tree["extensionsUsed"] = tree["extensionsRequired"] = ["EXT_meshopt_compression"]
-    return tree, packed
+    return tree, data
 
 
 def draco():
     """A box whose one primitive is compressed by Draco, by edgebreaker; its twin sequentially."""
-    tree, _ = files.document([box()], [box()])
-    packed = bytearray()
-    tree["bufferViews"] = []
-    for mesh in (0, 1):
-        shape = box()
-        data = DracoPy.encode(
-            shape["POSITION"].astype(np.float64),
+    shape = {name: box()[name] for name in ("POSITION", "NORMAL", "indices")}
+    tree, _ = files.document([shape], [shape])
+    encoded = [
+        DracoPy.encode(
+            shape["POSITION"],
             shape["indices"].astype(np.uint32),
             quantization_bits=12,
-            preserve_order=mesh == 1,
-            normals=shape["NORMAL"].astype(np.float64),
+            preserve_order=in_order,
+            normals=shape["NORMAL"],
         )
-        ids = {a["attribute_type"]: a["unique_id"] for a in DracoPy.decode(data).attributes}
-        primitive = tree["meshes"][mesh]["primitives"][0]
-        for name in ("TANGENT", "TEXCOORD_0"):
-            del primitive["attributes"][name]
-        primitive["extensions"] = {
-            "KHR_draco_mesh_compression": {
-                "bufferView": mesh,
-                "attributes": {"POSITION": ids[0], "NORMAL": ids[1]},
-            }
-        }
-        tree["bufferViews"].append(
-            {"buffer": 0, "byteOffset": len(packed), "byteLength": len(data)}
-        )
-        packed += data + b"\0" * (-len(data) % 4)
+        for in_order in (False, True)
+    ]
+    data, tree["bufferViews"] = packed(encoded)
+    for number, (mesh, part) in enumerate(zip(tree["meshes"], encoded, strict=True)):
+        ids = {a["attribute_type"]: a["unique_id"] for a in DracoPy.decode(part).attributes}
+        stored = {"bufferView": number, "attributes": {"POSITION": ids[0], "NORMAL": ids[1]}}
+        mesh["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": stored}
     for accessor in tree["accessors"]:
         del accessor["bufferView"]
-    tree["buffers"] = [{"byteLength": len(packed)}]
+    tree["buffers"] = [{"byteLength": len(data)}]
     tree["extensionsUsed"] = tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
-    return tree, packed
+    return tree, data
 
 
 def skinned():
@@ -201,43 +203,10 @@ def skinned():
     shape = octahedron(
         JOINTS_0=np.tile(np.array([[0, 1, 0, 0]], np.uint8), (6, 1)),
         WEIGHTS_0=np.tile([[0.25, 0.75, 0, 0]], (6, 1)),
+        targets=[{"POSITION": np.ones((6, 3))}],
     )
     tree, binary = files.document([shape])
-    target = files.add_accessor(tree, binary, np.ones((6, 3)))
-    tree["buffers"] = [{"byteLength": len(binary)}]
-    tree["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": target}]
     tree["skins"] = [{"joints": [1, 2]}]
     tree["nodes"] = [{"mesh": 0, "skin": 0}, {"children": [2]}, {}]
     tree["scenes"] = [{"nodes": [0, 1]}]
     return tree, binary
-
-
-def embedded(tree, binary):
-    """The same as a .gltf of one file."""
-    tree = json.loads(json.dumps(tree))
-    content = base64.b64encode(bytes(binary)).decode()
-    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{content}"
-    return json.dumps(tree).encode()
-
-
-def zipped(tree, binary):
-    """The same as an archive of two files."""
-    tree = json.loads(json.dumps(tree))
-    tree["buffers"][0]["uri"] = "box.bin"
-    target = io.BytesIO()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as opened:
-        opened.writestr("a/box.gltf", json.dumps(tree))
-        opened.writestr("a/box.bin", bytes(binary))
-    return Seed("zip", "application/zip", target.getvalue())
-
-
-def multipart(tree, binary):
-    """The same as two parts."""
-    tree = json.loads(json.dumps(tree))
-    tree["buffers"][0]["uri"] = "box.bin"
-    parts = [("file", json.dumps(tree).encode()), ("box.bin", bytes(binary))]
-    body = b"".join(
-        b'--X\r\nContent-Disposition: form-data; name="%b"\r\n\r\n%b\r\n' % (name.encode(), data)
-        for name, data in parts
-    )
-    return Seed("multipart", "multipart/form-data; boundary=X", body + b"--X--\r\n")

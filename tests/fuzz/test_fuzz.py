@@ -17,7 +17,7 @@ def test_seeds_are_well_formed(seed):
 
 
 def test_malformed_files_give_results_or_named_refusals(tmp_path):
-    tally = run(SEEDS, 2500, 60.0, 10_000_000, tmp_path / "body")
+    tally = run(SEEDS, 1500, 60.0, 10_000_000, tmp_path / "body")
     assert tally.run > 100
     assert not tally.faults
     assert tally.peak * MIB < LIMITS.max_memory_bytes + ALLOWANCE

@@ -10,6 +10,7 @@ from pns_common.adaptive.parts import Levels, Part
 from pns_common.mesh.rows import unit
 from pns_common.mesh.topology import EdgeClass
 from pns_common.parallel import Blocks
+from pns_common.schemes.limit import limit_normals
 from tests.support.meshes import (
     bent,
     block,
@@ -81,14 +82,18 @@ def test_vertices_are_where_whole_levels_put_them(name, scheme):
     assert made.mesh.face_count <= whole.mesh.face_count
 
 
-@pytest.mark.parametrize("sharpness", [1.0, 1.5, np.inf])
-def test_edges_that_wear_off_do_so_in_parts_of_levels(sharpness):
+@pytest.mark.parametrize("sharpness", [1.0, 1.5, 2.5, np.inf])
+@pytest.mark.parametrize("levels", [None, 1, 2])
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_edges_that_wear_off_do_so_in_parts_of_levels(sharpness, levels, scheme):
+    """Also where learned and other creases end before."""
     points, faces = bumpy_sphere(subdivisions=0, bump=0.3)
     mesh = Mesh(points, faces)
     pairs = mesh.topology().edges[::4].astype(np.int64)
-    creases = Creases(pairs, np.full(len(pairs), sharpness), wears=True)
-    made = refine(mesh, "loop", LEVELS, tolerance="1%", creases=creases)
-    whole = refine(mesh, "loop", LEVELS, creases=creases).mesh.vertices
+    given = np.full(len(pairs), sharpness)
+    creases = Creases(pairs, given, wears=True, learned=True, levels=levels)
+    made = refine(mesh, scheme, LEVELS, tolerance="1%", creases=creases)
+    whole = refine(mesh, scheme, LEVELS, creases=creases).mesh.vertices
     away, _ = cKDTree(whole).query(made.mesh.vertices)
     assert away.max() < 1e-12
 
@@ -155,7 +160,7 @@ def heights(made, points, row):
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-@pytest.mark.parametrize("goal", [{"tolerance": "0.5%"}, {"max_faces": 200}])
+@pytest.mark.parametrize("goal", [{"tolerance": "0.5%"}, {"angle": 20}, {"max_faces": 200}])
 def test_faces_of_different_levels_meet_without_gaps(name, scheme, goal):
     mesh = shape(name)
     made = refine(mesh, scheme, LEVELS, **goal)
@@ -189,7 +194,7 @@ def same_faces(made, other):
     return len(one) == len(two) and away.max() < NETWORKS
 
 
-GOALS = [{"tolerance": 0.02}, {"max_faces": 300}, {"max_edge_length": 0.3}]
+GOALS = [{"tolerance": 0.02}, {"angle": 25}, {"max_faces": 300}, {"max_edge_length": 0.3}]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
@@ -226,9 +231,10 @@ def test_ties_are_split_together_or_not_at_all(scheme, most):
     assert made.face_count <= most
 
 
-def test_a_cube_stays_as_it_is():
+@pytest.mark.parametrize("goal", [{"tolerance": "0.1%"}, {"angle": 1}])
+def test_a_cube_stays_as_it_is(goal):
     points, faces = block(1)[:2]
-    made = refine(Mesh(points, faces), "pns", tolerance="0.1%")
+    made = refine(Mesh(points, faces), "pns", **goal)
     assert made.mesh.face_count == len(faces)
     np.testing.assert_array_equal(made.mesh.faces, faces)
 
@@ -249,14 +255,73 @@ def test_a_rim_of_creases_is_as_near_as_its_faces_say():
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-def test_what_is_flat_stays_whole_beside_what_bends(scheme):
+@pytest.mark.parametrize("goal", [{"tolerance": "0.05%"}, {"angle": 2}])
+def test_what_is_flat_stays_whole_beside_what_bends(scheme, goal):
     """A sheet with a bump at one end is split there alone."""
     points, faces = grid(13, lambda x, y: np.where(x > 0.5, (x - 0.5) * 2, 0.0) * np.cos(3 * y))
-    made = refine(Mesh(points, faces), scheme, LEVELS, tolerance="0.05%", border="corners")
+    made = refine(Mesh(points, faces), scheme, LEVELS, border="corners", **goal)
     x, y = points[faces][:, :, 0].max(axis=1), np.abs(points[faces][:, :, 1]).max(axis=1)
     whole = np.flatnonzero((x < -0.2) & (y < 0.9))
     assert np.isin(whole, made.face_parents[made.face_levels == 0]).all()
     assert made.face_levels.max() > 1
+
+
+def worn(mesh):
+    """Return creases of the library's that wear off within three levels."""
+    pairs = mesh.topology().edges[::4].astype(np.int64)
+    return Creases(pairs, np.linspace(0.5, 2.5, len(pairs)), wears=True)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("creases", ["auto", "angle:40", "worn"])
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_angles_are_those_of_the_limit_normals_on_the_faces_side(name, creases, scheme):
+    mesh = shape(name)
+    creases = worn(mesh) if creases == "worn" else creases
+    made = refine(mesh, scheme, LEVELS, angle=15, creases=creases)
+    whole = refine(mesh, scheme, LEVELS, creases=creases)
+    # Learned edges that are more sharp than not have a side each.
+    dense = whole.surface.with_creases(np.flatnonzero(whole.surface.is_sharp))
+    normals = limit_normals(whole.steps[-1].points, dense)
+    at_corners = normals.sectors[normals.sector_of_corner].reshape(-1, 3, 3)
+    assert (made.angles[made.face_levels < LEVELS] <= 15).all()
+    for row in np.flatnonzero(made.face_levels < LEVELS):
+        later, code = 4 ** (LEVELS - made.face_levels[row] - 1), made.codes[row]
+        # Child k begins at corner k, and so do its own first children. The last one's corners are
+        # on the sides of the face.
+        begins = [(4 * code + k) * later for k in range(3)]
+        begins += [(4 * code + 3) * later + k * later // 4 for k in range(3)]
+        six = at_corners[begins, [0, 0, 0, *([0, 1, 2] if later == 1 else [0, 0, 0])]]
+        six = six[six.any(axis=1)]
+        apart = np.linalg.norm(six[:, None] - six, axis=2).max(initial=0)
+        assert made.angles[row] == pytest.approx(np.degrees(2 * np.arcsin(apart / 2)), abs=1e-5)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_smaller_angles_and_more_faces_turn_less(scheme):
+    mesh, last = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3)), 0
+    for angle in (60, 30, 15):
+        made = refine(mesh, scheme, angle=angle, levels=LEVELS)
+        assert made.mesh.face_count > last
+        last = made.mesh.face_count
+    turned = np.inf
+    for most in (50, 100, 200, 400):
+        made = refine(mesh, scheme, angle=15, max_faces=most)
+        assert 0.98 * most - 4 <= made.mesh.face_count <= most
+        assert made.angles.max() <= turned + 1e-9
+        turned = made.angles.max()
+
+
+def test_an_angle_and_a_tolerance_both_hold():
+    mesh = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3))
+    made = refine(mesh, "loop", tolerance="0.5%", angle=30)
+    assert made.angles.max() <= 30
+    assert made.distances.max() <= made.goal.tolerance
+    assert made.report["adaptive"]["angle"] == 30
+    assert made.report["adaptive"]["angle_max"] == made.angles.max()
+    alone = refine(mesh, "loop", tolerance="0.5%")
+    assert alone.mesh.face_count <= made.mesh.face_count
+    assert alone.report["adaptive"]["angle_max"] is None
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
@@ -281,6 +346,28 @@ def test_no_side_is_longer_than_asked():
     made = refine(mesh, "loop", max_edge_length=0.2).mesh
     corners = made.vertices[made.faces]
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= 0.2
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("goal", [*GOALS, {"tolerance": "0.1%", "max_faces": 900}])
+def test_progress_moves_never_falls_and_ends_with_all_faces(scheme, goal):
+    mesh, told = Mesh(*bumpy_sphere(subdivisions=0, bump=0.3)), []
+    made = refine(mesh, scheme, progress=lambda *faces: told.append(faces), **goal)
+    shares = [done / total for done, total in told]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.3
+    assert np.diff(shares).max() < 0.6
+    assert len(set(shares)) > 2
+    assert told[-1] == (made.mesh.face_count, made.mesh.face_count)
+
+
+def test_an_exception_of_progress_ends_a_refinement_to_a_goal():
+    def stop(done, total):
+        if done > 100:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refine(Mesh(*bumpy_sphere()), "loop", tolerance="0.1%", progress=stop)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
@@ -309,6 +396,10 @@ def test_values_are_carried_like_positions(scheme):
         ({"tolerance": np.nan}, "tolerance"),
         ({"tolerance": "-1%"}, "tolerance"),
         ({"tolerance": "much"}, "tolerance"),
+        ({"angle": 0}, "angle"),
+        ({"angle": 180}, "angle"),
+        ({"angle": np.nan}, "angle"),
+        ({"angle": "10"}, "angle"),
         ({"max_edge_length": -1.0}, "max_edge_length"),
         ({"max_faces": 11}, "max_faces"),
         ({"max_faces": 100.5}, "max_faces"),

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from pns_common import Creases, Mesh, catmull_clark, loop
+from pns_common import Creases, Mesh, ParameterError, catmull_clark, loop
 from pns_common import refine as refine_to_limit
 from pns_common.carry import rules
-from pns_common.carry.carried import Carried, Column, refine_carried
+from pns_common.carry.carried import Carried, Carrier, Column, refine_carried
+from pns_common.carry.charts import refine_corners
 from pns_common.schemes import CATMULL_CLARK, LOOP
 from tests.support.control_points import refine
 from tests.support.meshes import bumpy_sphere, grid
-from tests.support.polygons import SHAPES, mixed_cube, uneven
+from tests.support.polygons import SHAPES, mixed_cube, quad_grid, uneven
 
 SCHEMES = {"triangles": (bumpy_sphere(), loop()), "polygons": (mixed_cube(), catmull_clark())}
 
@@ -31,12 +32,30 @@ def test_positions_carried_smoothly_are_the_positions(name, levels, limit):
     shape, scheme = SCHEMES[name]
     mesh = Mesh(*shape)
     edges = mesh.topology().edges[:5].astype(np.int64)
-    creases = Creases(edges, np.linspace(0.2, 1, 5), levels=2, vertices=[7], vertex_sharpness=[1.5])
+    corners = {"vertices": [5, 7], "vertex_sharpness": [np.inf, 1.5]}
+    creases = Creases(edges, np.linspace(0.2, 1, 5), levels=2, **corners)
     for at, values in (("vertices", mesh.vertices), ("corners", mesh.vertices[mesh.corners])):
         asked = at, Column(values, rules.smooth), mesh, scheme, levels
         made, fine = carried(*asked, limit=limit, creases=creases)
         expected = fine.vertices if at == "vertices" else fine.vertices[fine.corners]
         np.testing.assert_array_equal(made, expected)
+
+
+@pytest.mark.parametrize("rule", [rules.smooth, rules.linear, rules.nearest])
+@pytest.mark.parametrize("name", SCHEMES)
+def test_corners_without_seams_have_one_value_at_each_vertex(name, rule):
+    """A file of such values keeps one a vertex, labels too."""
+    shape, scheme = SCHEMES[name]
+    mesh = Mesh(*shape)
+    made = refine(mesh, scheme, 2)
+    carrier = Carrier(made.topologies, scheme.base)
+    values, points = carrier.at_points(
+        Column(np.arange(len(mesh.vertices))[mesh.corners, None], rule)
+    )
+    at_vertices = carrier.at_vertices(Column(np.arange(len(mesh.vertices))[:, None], rule))
+    assert len(values) == len(made.mesh.vertices)
+    if rule in (rules.smooth, rules.linear):
+        np.testing.assert_array_equal(values[points], at_vertices[made.mesh.corners])
 
 
 @pytest.mark.parametrize("name", SCHEMES)
@@ -144,3 +163,26 @@ def test_what_is_to_stay_of_a_chart_stays(base, keep):
         np.testing.assert_array_equal(stays, expected[keep])
     if keep == "none":
         np.testing.assert_array_equal(at, fine.vertices)
+
+
+def test_along_a_seam_both_sides_stay_as_they_lay():
+    """Two charts that share a line of vertices: on it each side is linear, and inside it smooth."""
+    mesh, apart = Mesh(*quad_grid(7)), [5.0, 0]
+    left = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] < 0
+    values = mesh.vertices[mesh.corners][:, :2]
+    values[~np.repeat(left, 4)] += apart
+    column = Column(values, rules.smooth)
+    corners, fine = carried("corners", column, mesh, catmull_clark(), 2, limit=False)
+    corners, positions = corners.reshape(-1, 4, 2), fine.vertices[fine.faces][..., :2]
+    on_left = np.repeat(left, 16)
+    # A linear function of the plane stays one, on both sides of the seam.
+    np.testing.assert_allclose(np.ptp(corners[on_left][..., 0]), 1, atol=1e-12)
+    moved = np.where(on_left[:, None, None], corners, corners - apart)
+    inner = np.abs(positions).max(axis=(1, 2)) < 0.6
+    np.testing.assert_allclose(moved[inner], positions[inner], atol=1e-12)
+
+
+def test_one_row_for_each_corner_is_asked_for():
+    made = refine(Mesh(*SHAPES["cube"]), "catmull-clark", 1)
+    with pytest.raises(ParameterError, match="corner"):
+        refine_corners(np.zeros((8, 2)), made.topologies, CATMULL_CLARK)

@@ -6,8 +6,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pns_common import Creases, Mesh, ParameterError, catmull_clark, load_model, loop, pns
-from pns_common.carry.charts import refine_corners
-from pns_common.carry.columns import refine_columns
 from pns_common.interop.carried import CarriedMesh, refine_carried
 from pns_common.parallel import Blocks
 from pns_common.schemes import CATMULL_CLARK, LOOP
@@ -58,43 +56,34 @@ def test_a_corner_weight_blends_any_rule_with_staying(limit, given_mesh, seed):
     np.testing.assert_array_equal(made[:count][same], expected[same])
 
 
-SHARPNESS = [0.25, 0.75, 1, 1.5, 2, 3, np.inf]
+CREASES = [[], [[0, 1]], [[0, 1], [1, 5]], [[0, 1], [1, 5], [1, 3]]]
+QUADS = [(SHAPES[name], [0, 1, 3, 6], c) for name in ("cube", "open box", "mixed") for c in CREASES]
 
 
-def opensubdivs(oracle, points, faces, creases, vertices, sharpness):
-    named = zip(vertices, np.minimum(sharpness, 10), strict=True)
-    return oracle(points, faces, 3, creases, list(named))[0]
+def triangles(points, faces):
+    """A mesh, vertices at its rim, if any, and inside, and three edges that meet them or not."""
+    topology = Mesh(points, faces).topology()
+    inner = topology.edges[topology.interior[[4, 9, 14]]].astype(int)
+    return (points, faces.tolist()), [0, *inner[0].tolist(), len(points) - 1], inner
 
 
-@pytest.mark.parametrize("sharpness", SHARPNESS)
-@pytest.mark.parametrize("creases", [[], [[0, 1]], [[0, 1], [1, 5]], [[0, 1], [1, 5], [1, 3]]])
-@pytest.mark.parametrize("shape", ["cube", "open box", "mixed"])
-def test_quads_equal_opensubdivs(shape, creases, sharpness):
+@pytest.mark.parametrize("sharpness", [0.25, 0.75, 1, 1.5, 2, 3, np.inf])
+@pytest.mark.parametrize(
+    ("shape", "vertices", "creases"),
+    [*QUADS, triangles(*bumpy_sphere()), triangles(*grid(5, lambda x, y: x * y))],
+)
+def test_corners_equal_opensubdivs(shape, vertices, creases, sharpness):
     """At smooth vertices, darts, curves, corners and boundaries, for any sharpness."""
-    points, faces = SHAPES[shape]
-    points, vertices = uneven(points), [0, 1, 3, 6]
+    points, faces = shape
+    points, of_quads = uneven(points), any(len(face) == 4 for face in faces)
     pairs = np.array(creases, dtype=int).reshape(-1, 2)
     kept = Creases(pairs, vertices=vertices, vertex_sharpness=[sharpness] * 4)
-    made = refine(Mesh(points, faces), catmull_clark(), 3, creases=kept).mesh
-    expected = opensubdivs(
-        opensubdiv.catmull_clark, points, faces, creases, vertices, [sharpness] * 4
+    scheme, oracle = (
+        (catmull_clark(), opensubdiv.catmull_clark) if of_quads else (loop(), opensubdiv.loop)
     )
-    np.testing.assert_allclose(made.vertices[made.faces], expected, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("sharpness", SHARPNESS)
-@pytest.mark.parametrize("shape", [bumpy_sphere(), grid(5, lambda x, y: x * y)])
-def test_triangles_equal_opensubdivs(shape, sharpness):
-    points, faces = shape
-    topology = Mesh(points, faces).topology()
-    vertices = [0, *topology.edges[topology.interior[4]].tolist(), len(points) - 1]
-    rows = topology.interior[[4, 9, 14]]
-    creases = topology.edges[rows].astype(int)
-    kept = Creases(creases, vertices=vertices, vertex_sharpness=[sharpness] * 4)
-    made = refine(Mesh(points, faces), loop(), 3, creases=kept).mesh
-    expected = opensubdivs(
-        opensubdiv.loop, points, faces.tolist(), creases, vertices, [sharpness] * 4
-    )
+    made = refine(Mesh(points, faces), scheme, 3, creases=kept).mesh
+    named = [(vertex, min(sharpness, 10)) for vertex in vertices]
+    expected, *_ = oracle(points, faces, 3, creases, named)
     np.testing.assert_allclose(made.vertices[made.faces], expected, rtol=0, atol=1e-12)
 
 
@@ -130,18 +119,6 @@ def test_vertices_are_sharp_at_as_many_levels_as_edges_unless_said_otherwise():
     made = refine(mesh, loop(), 4, creases=told)
     assert [topology.corner_weights[3] for topology in made.topologies] == [1, 1, 0.25, 0]
     assert not any(topology.corner_weights[4] for topology in made.topologies)
-
-
-@pytest.mark.parametrize("base", [LOOP, CATMULL_CLARK])
-def test_columns_and_values_of_corners_keep_the_corners_of_the_surface(base):
-    shape = bumpy_sphere() if base is LOOP else SHAPES["mixed"]
-    mesh = Mesh(uneven(shape[0]), shape[1])
-    kept = Creases(vertices=[0, 5], vertex_sharpness=[2, np.inf])
-    made = refine(mesh, base.name, 2, creases=kept)
-    refined, faces = made.mesh.vertices, made.mesh.faces
-    np.testing.assert_array_equal(refine_columns(mesh.vertices, made.topologies, base), refined)
-    at_corners = refine_corners(mesh.vertices[mesh.corners], made.topologies, base)
-    np.testing.assert_allclose(at_corners, refined[faces], rtol=0, atol=1e-14)
 
 
 def test_a_sharp_corner_of_a_border_is_that_of_the_rule_of_corners():

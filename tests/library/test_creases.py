@@ -10,6 +10,7 @@ from pns_common.mesh.topology import EdgeClass, build_topology
 from pns_common.parallel import Blocks
 from pns_common.schemes import LOOP
 from tests.support.meshes import bumpy_sphere, grid, manifolds, soups
+from tests.support.polygons import renumbered
 
 seeds = st.integers(0, 2**31)
 
@@ -17,21 +18,6 @@ seeds = st.integers(0, 2**31)
 def placed(mesh, sharpness):
     topology = build_topology(mesh.faces, len(mesh.vertices)).with_sharpness(sharpness)
     return LOOP.place(mesh.vertices, topology, Blocks())
-
-
-def masks_of(mesh, sharpness):
-    """The mask matrix: what each unit vector becomes."""
-    topology = build_topology(mesh.faces, len(mesh.vertices)).with_sharpness(sharpness)
-    return LOOP.place(np.eye(len(mesh.vertices)), topology, Blocks())
-
-
-@given(soups() | manifolds(), seeds)
-def test_masks_are_means_for_any_sharpness(mesh, seed):
-    """All rows are ≥ 0 with sum 1, so bounds on displacements hold on the limit surface."""
-    count = len(build_topology(mesh.faces, len(mesh.vertices)).edges)
-    rows = masks_of(mesh, np.random.default_rng(seed).uniform(0, 1, count))
-    assert rows.min() >= -1e-15
-    np.testing.assert_allclose(rows.sum(axis=1), 1, atol=1e-13)
 
 
 @given(soups() | manifolds(), seeds)
@@ -99,11 +85,7 @@ def test_an_angle_of_ones_own_finds_all_edges_beyond_it():
 
 @given(manifolds(), seeds)
 def test_sharp_edges_do_not_depend_on_numbering(mesh, seed):
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(len(mesh.vertices))
-    other = Mesh(
-        mesh.vertices[np.argsort(order)], order[mesh.faces][rng.permutation(len(mesh.faces))]
-    )
+    other, order = renumbered(mesh, seed)
     pairs = {frozenset(order[pair].tolist()) for pair in sharp_edges(mesh)}
     assert {frozenset(pair.tolist()) for pair in sharp_edges(other)} == pairs
 

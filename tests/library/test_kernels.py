@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pns_common import kernels
-from pns_common.kernels import loop
+from pns_common.kernels import normals
 
 DIGEST = """
 import hashlib
@@ -47,22 +47,26 @@ def test_numba_gives_the_same_bits():
     "arguments",
     [
         (),
-        (np.zeros((3, 3)), 0, 3, 0),
-        (np.zeros((3, 3), np.float32), 0, 3),
-        (np.zeros((3, 3), ">f8"), 0, 3),
-        (np.zeros(9), 0, 3),
-        (np.zeros((6, 3))[::2], 0, 3),
-        (np.zeros((3, 3)).T, 0, 3),
-        ([[0.0, 0.0, 0.0]], 0, 1),
-        (np.zeros((3, 3)), 0.0, 3),
-        (np.zeros((3, 3)), "0", 3),
+        (0, 3, np.zeros((3, 3)), 0),
+        (0, 3, np.zeros((3, 3), np.float32)),
+        (0, 3, np.zeros((3, 3), ">f8")),
+        (0, 3, np.zeros(9)),
+        (0, 3, np.zeros((6, 3))[::2]),
+        (0, 3, np.zeros((3, 3)).T),
+        (0, 1, [[0.0, 0.0, 0.0]]),
+        (0.0, 3, np.zeros((3, 3))),
+        ("0", 3, np.zeros((3, 3))),
         (None, None, None),
+        (0, 3, (np.zeros((3, 3)), np.zeros((3, 3)))),
+        (0, 3, (np.zeros((3, 3)),) * 40),
     ],
     ids=str,
 )
 def test_a_loop_refuses_what_it_was_not_compiled_for(arguments):
-    with pytest.raises(TypeError, match=r"^loop\.largest_coordinate is compiled for \['f8_2d, int"):
-        loop.largest_coordinate(*arguments)
+    with pytest.raises(
+        TypeError, match=r"^normals\.scale_to_unit is compiled for \['int, int, f8_2d"
+    ):
+        normals.scale_to_unit(*arguments)
 
 
 def test_code_of_other_sources_is_not_run(monkeypatch):

@@ -4,8 +4,6 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pns_common import Mesh, loop
 from pns_common.mesh.topology import EdgeClass, build_topology
@@ -17,8 +15,6 @@ from tests.support.meshes import (
     bow_tie,
     bumpy_sphere,
     grid,
-    manifolds,
-    soups,
     three_pages,
 )
 from tests.support.shared import shared_path
@@ -59,40 +55,6 @@ def test_real_closed_meshes_equal_trimesh(name):
     assert match(refined.vertices, expected) < 1e-12
 
 
-@pytest.mark.parametrize("valence", range(3, 13))
-def test_tangent_eigenvalue_of_the_star_is_loops(valence):
-    """The subdivision matrix of a k-star, column by column, has 3/8 + cos(2π/k)/4 twice."""
-    ring = np.arange(valence)
-    faces = np.stack([np.zeros(valence, int), 1 + ring, 1 + (ring + 1) % valence], axis=1)
-    # A second ring makes the first one interior, so that all its footprints are complete.
-    outer = 1 + valence + ring
-    following = (ring + 1) % valence
-    strip = [np.stack([1 + ring, outer, outer[following]], axis=1)]
-    strip += [np.stack([1 + ring, outer[following], 1 + following], axis=1)]
-    faces = np.concatenate([faces, *strip])
-    count = 1 + 2 * valence
-    topology = build_topology(faces, count)
-    star = np.zeros((1 + valence, 1 + valence))
-    edges = {tuple(edge): count + e for e, edge in enumerate(topology.edges.tolist())}
-    rows = [0] + [edges[0, 1 + i] for i in ring]
-    for column in range(1 + valence):
-        points = np.zeros((count, 3))
-        points[column] = 1
-        star[:, column] = refine(Mesh(points, faces), loop(), 1).mesh.vertices[rows, 0]
-    moduli = np.sort(np.abs(np.linalg.eigvals(star)))
-    tangent = 3 / 8 + np.cos(2 * np.pi / valence) / 4
-    assert moduli[-1] == pytest.approx(1, abs=1e-12)
-    np.testing.assert_allclose(moduli[-3:-1], tangent, rtol=0, atol=1e-12)
-
-
-def test_affine_heights_are_reproduced():
-    vertices, faces = grid(8, lambda x, y: 2 * x - 3 * y + 1)
-    refined = refine(Mesh(vertices, faces), loop(), 2).mesh.vertices
-    np.testing.assert_allclose(
-        refined[:, 2], 2 * refined[:, 0] - 3 * refined[:, 1] + 1, rtol=0, atol=1e-13
-    )
-
-
 def test_boundary_follows_the_cubic_curve():
     vertices, faces = grid(5, bent)
     refined = refine(Mesh(vertices, faces), loop(), 1).mesh.vertices
@@ -128,26 +90,6 @@ def test_vertex_on_one_irregular_edge_is_a_dart_and_follows_loops_rule():
     expected = (1 - 5 * beta) * points[0] + beta * points[1:].sum(axis=0)
     np.testing.assert_allclose(refined.mesh.vertices[0], expected, rtol=0, atol=1e-14)
     assert refined.report["multi_fan_vertices"] == 2
-
-
-@given(soups() | manifolds(), st.integers(1, 2))
-def test_no_mesh_is_refused_and_faces_become_four(mesh, levels):
-    refined = refine(mesh, loop(), levels)
-    assert len(refined.mesh.faces) == 4**levels * len(mesh.faces)
-    assert np.isfinite(refined.mesh.vertices).all()
-
-
-@given(manifolds())
-def test_relabelling_permutes_output(mesh):
-    rng = np.random.default_rng(0)
-    order = rng.permutation(len(mesh.vertices))
-    moved = np.empty_like(mesh.vertices)
-    moved[order] = mesh.vertices
-    other = Mesh(moved, order[mesh.faces])
-    refined, relabelled = refine(mesh, loop(), 1).mesh, refine(other, loop(), 1).mesh
-    np.testing.assert_allclose(
-        relabelled.vertices[relabelled.faces], refined.vertices[refined.faces], rtol=0, atol=1e-14
-    )
 
 
 def test_isolated_vertices_stay():

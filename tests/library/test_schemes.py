@@ -7,13 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pns_common import Mesh, MeshError, ModelError, Scheme, load_model, loop, pns, refine
+from pns_common import (
+    Mesh,
+    MeshError,
+    ModelError,
+    Scheme,
+    catmull_clark,
+    load_model,
+    loop,
+    pns,
+    refine,
+)
 from pns_common.mesh.topology import split_triangles
 from pns_common.model.file import bundled_models
 from pns_common.schemes.base_scheme import BaseScheme
 from tests.support.meshes import bumpy_sphere, grid
 from tests.support.networks import Float64Model, default_model, random_layers
 from tests.support.polygons import mixed_cube
+from train.spectra import stars
 
 
 def midpoints(values, topology, blocks):
@@ -23,6 +34,21 @@ def midpoints(values, topology, blocks):
 
 
 FLAT = Scheme("flat", BaseScheme("flat", midpoints, split_triangles))
+
+
+@pytest.mark.parametrize("valence", range(3, 13))
+def test_tangent_eigenvalues_of_a_star_are_the_published_ones(valence):
+    """Loop's 3/8 + cos(2π/k)/4; λ of Halstead, Kass and DeRose. No other is as large, but for 1."""
+    c = np.cos(2 * np.pi / valence)
+    of_quads = (5 + c + np.cos(np.pi / valence) * np.sqrt(18 + 2 * c)) / 16
+    for scheme, star, published in (
+        (loop(), stars.star(valence, 3, 1.0), 3 / 8 + c / 4),
+        (catmull_clark(), stars.quad_star(valence, 3, 1.0), of_quads),
+    ):
+        matrix = scheme.matrix(star.mesh).toarray()[np.ix_(star.refined, star.inner)]
+        values = np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
+        np.testing.assert_allclose(values[:3], [1, published, published], rtol=0, atol=1e-12)
+        assert values[3] < published - 1e-3
 
 
 def test_a_new_base_scheme_is_a_few_lines():

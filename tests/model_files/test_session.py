@@ -9,13 +9,14 @@ from functools import partial
 
 import numpy as np
 import pytest
-from onnx import TensorProto, helper
+from onnx import helper
 
 from pns_common import ModelError, ParameterError
 from pns_common.model.file import model_from_bytes
 from pns_common.model.session import CHUNK_ROWS, CPU, Model, networks
 from tests.support.networks import (
     HIDDEN,
+    breaking_off_bytes,
     default_model,
     default_model_bytes,
     float64_network,
@@ -134,19 +135,8 @@ def test_answers_that_are_not_finite_are_refused():
 
 
 def test_a_graph_that_breaks_off_is_refused():
-    """It keeps the contract and reads rows that there are not."""
-    nodes = [
-        node("Slice", ["features", "zero", "one", "axis"], ["first"]),
-        node("Slice", ["features", "zero", "three", "axis"], ["answer"]),
-        node("Squeeze", ["first", "axis"], ["flat"]),
-        node("Add", ["flat", "far"], ["beyond"]),
-        node("Cast", ["beyond"], ["rows"], to=TensorProto.INT64),
-        node("Gather", ["answer", "rows"], ["correction"]),
-    ]
-    whole = {name: np.array([i]) for name, i in (("zero", 0), ("one", 1), ("three", 3))}
-    data = model_bytes(nodes, whole | {"axis": whole["one"], "far": np.full(1, 1e6)})
     with pytest.raises(ModelError, match="runs to its end"):
-        model_from_bytes(data, "breaks").run("features", rows(3))
+        model_from_bytes(breaking_off_bytes(), "breaks").run("features", rows(3))
 
 
 def test_answers_of_another_shape_are_refused():

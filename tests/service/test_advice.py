@@ -1,7 +1,5 @@
 """advice: where the result is in doubt or little changed, and the option that helps."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -9,8 +7,9 @@ import pytest
 
 from pns_common import Creases, Mesh, load_model
 from service.advice import Bends, advice_on, count_bends
+from service.changes import with_flags
 from service.gltf.subdivide import subdivide_gltf
-from service.meshfiles.convert import as_flags, converted
+from service.meshfiles.convert import converted
 from service.options import Limits, Options
 from tests.service.gltf.test_options import cylinder
 from tests.support.gltf.files import glb
@@ -27,7 +26,7 @@ def report_of(*meshes, **options):
 
 
 def advice(*meshes, **options):
-    return report_of(*meshes, **options)["advice"]
+    return [each["text"] for each in report_of(*meshes, **options)["advice"]]
 
 
 def mesh_of(shape):
@@ -81,18 +80,19 @@ LEVEL = report_of(octahedron())["levels"]
 
 
 def test_a_doubt_names_the_two_pictures_that_it_may_lead_to():
-    (line,) = advice_on(LEVEL, Bends(40, 22))
-    assert line == (
+    (doubt,) = advice_on(LEVEL, Bends(40, 22))
+    assert doubt.text == (
         "22 of 40 steep edges are neither clearly sharp nor clearly round: use crease=off for a "
         "body that is round throughout, or crease=angle:40 for flat sides with crisp edges"
     )
-    assert re.findall(r"--crease \S+", as_flags(line)) == ["--crease off", "--crease angle:40"]
+    assert doubt.options == ("crease=off", "crease=angle:40")
+    assert re.findall(r"--crease \S+", with_flags(doubt)) == ["--crease off", "--crease angle:40"]
 
 
 def test_a_part_that_keeps_no_edge_is_spoken_of_first():
-    (line,) = advice_on(LEVEL, Bends(40, 40, 14))
-    assert line.startswith("no edge is kept sharp where 14 bend by more than 60 degrees: use")
-    assert "crease=angle:40 for flat sides" in line
+    (doubt,) = advice_on(LEVEL, Bends(40, 40, 14))
+    assert doubt.text.startswith("no edge is kept sharp where 14 bend by more than 60 degrees: use")
+    assert doubt.options == ("crease=angle:40",)
 
 
 def test_triangles_that_share_no_vertex_say_how_to_join_them():
@@ -121,5 +121,5 @@ def test_only_faces_that_have_others_are_to_be_joined(faces, count):
     lines += [faces, faces.translate(str.maketrans("12345", "6789X")).replace("X", "10")][:count]
     options = Options(scheme="loop" if faces == "f 1 2 3" else "catmull-clark")
     made = converted("\n".join(lines).encode(), "obj", "obj", options, None, Limits())
-    (line,) = made.report["advice"]
-    assert ("weld_tolerance" in line) == (count == 2)
+    (told,) = made.report["advice"]
+    assert bool(told["options"]) == (count == 2)

@@ -1,33 +1,25 @@
 """Clients that mean well: some slow, some that leave, and a probe."""
 
-from __future__ import annotations
-
 import hashlib
 import http.client
 import random
 import socket
-import threading
 import time
 from contextlib import closing, suppress
-from multiprocessing.connection import Connection
-from multiprocessing.synchronize import Event
-
-from tests.soak.samples import Sample
-from tests.soak.tally import Tally
 
 PATIENCE = 120
-Address = tuple[str, int]
+FAILED = OSError, http.client.HTTPException
 
 
-def connection(address: Address) -> http.client.HTTPConnection:
+def connection(address):
     """A connection that gives up after `PATIENCE`."""
-    return http.client.HTTPConnection(*address, timeout=PATIENCE)
+    return closing(http.client.HTTPConnection(*address, timeout=PATIENCE))
 
 
-def wait_until_ready(address: Address) -> None:
+def wait_until_ready(address):
     """Wait until a worker has the model."""
     for _ in range(1200):
-        with closing(connection(address)) as opened, suppress(OSError):
+        with connection(address) as opened, suppress(OSError):
             opened.request("GET", "/readyz")
             if opened.getresponse().status == 200:
                 return
@@ -35,20 +27,32 @@ def wait_until_ready(address: Address) -> None:
     raise TimeoutError("the service is not ready")
 
 
-def honest(
-    address: Address, samples: list[Sample], tally: Tally, ended: threading.Event, seed: int
-) -> None:
+def asked(address, query, body, **headers):
+    """Status, sha256 of the content, and seconds until it is to be asked again."""
+    headers = {name.replace("_", "-"): value for name, value in headers.items()}
+    with connection(address) as opened:
+        try:
+            opened.request("POST", f"/subdivide?{query}", body, headers)
+            answer = opened.getresponse()
+            digest = hashlib.sha256(answer.read()).hexdigest()
+        except FAILED:
+            # Refused or cut off: where that was right, the attacks' own tests say.
+            return 0, "", 1.0
+        return answer.status, digest, float(answer.headers.get("Retry-After", 1))
+
+
+def honest(address, samples, tally, ended, seed):
     """One request after another, in any format; every answer is compared."""
     rng = random.Random(seed)
     while not ended.is_set():
         sample = rng.choice(samples)
         began = time.perf_counter()
-        status, digest, retry = _ask(address, sample)
+        kind = sample.content_type
+        status, digest, retry = asked(address, sample.query, sample.body, Content_Type=kind)
         tally.answer(sample.name.partition("-")[0], status)
         if status == 200:
-            tally.took(
-                "small job" if sample.name == "small" else "job", time.perf_counter() - began
-            )
+            what = "small job" if sample.name == "small" else "job"
+            tally.took(what, time.perf_counter() - began)
             if digest != sample.digest:
                 tally.mistake(f"{sample.name}: {digest}")
         elif status in (429, 503):
@@ -58,52 +62,31 @@ def honest(
         ended.wait(rng.uniform(0, 0.1))
 
 
-def _ask(address: Address, sample: Sample) -> tuple[int, str, float]:
-    with closing(connection(address)) as opened:
-        try:
-            opened.request(
-                "POST",
-                f"/subdivide?{sample.query}",
-                sample.body,
-                {"Content-Type": sample.content_type},
-            )
-            answer = opened.getresponse()
-            content = answer.read()
-        except (OSError, http.client.HTTPException):
-            # Refused or cut off: where that was right, the attacks' own tests say.
-            return 0, "", 1.0
-        retry = float(answer.headers.get("Retry-After", 1))
-        return answer.status, hashlib.sha256(content).hexdigest(), retry
-
-
-def large(address: Address, body: bytes, tally: Tally, ended: threading.Event) -> None:
+def large(address, body, tally, ended):
     """Jobs of seconds, without end."""
+    kinds = {"Content_Type": "model/gltf-binary", "Accept": "application/json"}
     while not ended.is_set():
-        with closing(connection(address)) as opened, suppress(OSError, http.client.HTTPException):
-            opened.request(
-                "POST",
-                "/subdivide?levels=4&scheme=loop",
-                body,
-                {"Content-Type": "model/gltf-binary", "Accept": "application/json"},
-            )
-            answer = opened.getresponse()
-            answer.read()
-            tally.answer("large", answer.status)
-            if answer.status in (429, 503):
-                ended.wait(min(float(answer.headers.get("Retry-After", 1)), 5))
+        status, _, retry = asked(address, "levels=4&scheme=loop", body, **kinds)
+        if status:
+            tally.answer("large", status)
+        if status in (429, 503):
+            ended.wait(min(retry, 5))
         ended.wait(2)
 
 
-def slow(address: Address, samples: list[Sample], tally: Tally, ended: threading.Event) -> None:
-    """Uploads and reads at 64 KiB a second: slow, and within what is allowed."""
-    sample = next(sample for sample in samples if sample.name.startswith("obj"))
-    head = (
+def head_of(sample):
+    return (
         f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
         f"Content-Type: {sample.content_type}\r\nContent-Length: {len(sample.body)}\r\n\r\n"
-    )
+    ).encode()
+
+
+def slow(address, samples, tally, ended):
+    """Uploads and reads at 64 KiB a second: slow, and within what is allowed."""
+    sample = next(sample for sample in samples if sample.name.startswith("obj"))
     while not ended.is_set():
         with suppress(OSError), socket.create_connection(address, timeout=PATIENCE) as opened:
-            opened.sendall(head.encode())
+            opened.sendall(head_of(sample))
             for start in range(0, len(sample.body), 2**13):
                 opened.sendall(sample.body[start : start + 2**13])
                 ended.wait(1 / 8)
@@ -111,36 +94,28 @@ def slow(address: Address, samples: list[Sample], tally: Tally, ended: threading
             while piece := opened.recv(2**13):
                 answer += piece
                 ended.wait(1 / 8)
-            if not answer:
-                # Cut off, as the slowest of all, for a new connection.
-                tally.answer("slow", 0)
-                continue
             got, _, content = answer.partition(b"\r\n\r\n")
-            status = int(got.split(maxsplit=2)[1])
+            # Without an answer it was cut off, as the slowest of all, for a new connection.
+            status = int(got.split(maxsplit=2)[1]) if answer else 0
             tally.answer("slow", status)
             if status == 200 and hashlib.sha256(content).hexdigest() != sample.digest:
                 tally.mistake(f"slow {sample.name}")
 
 
-def leaving(
-    address: Address, samples: list[Sample], tally: Tally, ended: threading.Event, seed: int
-) -> None:
+def leaving(address, samples, tally, ended, seed):
     """Clients that go at any moment: in the upload, in the job, in the answer."""
     rng = random.Random(seed)
     while not ended.is_set():
         sample = rng.choice(samples)
-        head = (
-            f"POST /subdivide?{sample.query} HTTP/1.1\r\nHost: localhost\r\n"
-            f"Content-Type: {sample.content_type}\r\nContent-Length: {len(sample.body)}\r\n\r\n"
-        )
-        message = head.encode() + sample.body
+        head = head_of(sample)
+        message = head + sample.body
         with suppress(OSError), socket.create_connection(address, timeout=PATIENCE) as opened:
             opened.sendall(message[: rng.choice([10, len(head), len(message) // 2, len(message)])])
             ended.wait(rng.uniform(0, 0.1))
         tally.answer("leaving", 0)
 
 
-def probe(address: Address, ended: Event, answers: Connection) -> None:
+def probe(address, ended, answers):
     """GET /healthz, ten times a second, each on a new connection; tells status and seconds.
 
     Who has connected and said nothing while as many others came as there are slots gives way to
@@ -154,9 +129,9 @@ def probe(address: Address, ended: Event, answers: Connection) -> None:
         ended.wait(0.1)
 
 
-def _healthz(address: Address) -> int:
+def _healthz(address):
     """The status; 0 where there is no answer."""
-    with closing(connection(address)) as opened, suppress(OSError, http.client.HTTPException):
+    with connection(address) as opened, suppress(*FAILED):
         opened.request("GET", "/healthz")
         return opened.getresponse().status
     return 0

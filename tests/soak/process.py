@@ -10,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +34,7 @@ class Held:
 
 
 @contextmanager
-def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
+def started(log):
     """Two replicas behind the proxy of deploy/, or one alone where there is no nginx.
 
     Yields the address that clients ask, and the first replica's process id; lines of both go to
@@ -53,7 +52,7 @@ def started(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
 
 
 @contextmanager
-def _replica(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
+def _replica(log):
     command = [sys.executable, "-c", "from service.cli import main; main()", "serve", "--port", "0"]
     with log.open("a") as lines:
         before = log.stat().st_size
@@ -70,7 +69,7 @@ def _replica(log: Path) -> Iterator[tuple[tuple[str, int], int]]:
         process.wait(90)
 
 
-def least_held_by(pid: int, seconds: float) -> Held:
+def least_held_by(pid, seconds):
     """The least that each process of a family holds meanwhile: what a job takes, it gives back.
 
     Of each, whenever that is: with clients all the time they seldom rest at the same moment. One
@@ -89,12 +88,12 @@ def least_held_by(pid: int, seconds: float) -> Held:
     return Held(sum(least.values()) / 1024, descriptors, processes)
 
 
-def lines_of(log: Path) -> list[dict[str, object]]:
+def lines_of(log):
     """The service's log; every line must be JSON."""
     return [json.loads(line) for line in log.read_text().splitlines()]
 
 
-def faults_in(log: Path) -> list[dict[str, object]]:
+def faults_in(log):
     """Lines of the proxy and the service about requests that failed for no fault of their own."""
     access = log.parent / "access.log"
     proxy = lines_of(access) if access.exists() else []
@@ -107,14 +106,14 @@ def faults_in(log: Path) -> list[dict[str, object]]:
     return [line for line in (*proxy, *service) if line.get("request_id") in faults]
 
 
-def _children(pid: int) -> Iterator[int]:
+def _children(pid):
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
         for child in map(int, path.read_text().split()):
             yield child
             yield from _children(child)
 
 
-def _sizes(pid: int) -> dict[int, int]:
+def _sizes(pid):
     """KiB by process: shared pages by parts. A part of a library's file grows as others end."""
     sizes = {}
     for one in (pid, *_children(pid)):
@@ -125,5 +124,5 @@ def _sizes(pid: int) -> dict[int, int]:
     return sizes
 
 
-def _descriptors(pid: int) -> int:
+def _descriptors(pid):
     return len(list(Path(f"/proc/{pid}/fd").iterdir()))

@@ -5,20 +5,15 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time
-from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing.connection import Connection
-from multiprocessing.synchronize import Event
 
 from tests.soak import honest
-from tests.soak.attacks import ATTACKS, Attack
-from tests.soak.bodies import large_body
+from tests.soak.attacks import ATTACKS, Target
 from tests.soak.process import Held, least_held_by
-from tests.soak.samples import samples, small_sample
+from tests.soak.samples import large_body, samples, small_sample
 from tests.soak.tally import Tally
-from tests.soak.target import Target
 
 Address = tuple[str, int]
 QUIET = "quiet"
@@ -36,15 +31,8 @@ class Soaked:
 
 
 def soak(
-    address: Address,
-    seconds: float,
-    pid: int | None = None,
-    attacks: dict[str, Attack] = ATTACKS,
-    say: Callable[[str], None] = print,
-    *,
-    warm_seconds: float = 0.0,
-    one_source: bool = False,
-) -> Soaked:
+    address, seconds, pid=None, attacks=ATTACKS, say=print, *, warm_seconds=0.0, one_source=False
+):
     """Run for about so many seconds: a tenth each in quiet before and after, the rest in attacks.
 
     Attackers have addresses of their own, or (`one_source`) none but the honest clients'. Memory is
@@ -87,7 +75,7 @@ def soak(
     return Soaked(tally, before, after)
 
 
-def _quiet(seconds: float, pid: int | None) -> Held | None:
+def _quiet(seconds, pid):
     """Let the honest clients alone; what the service holds meanwhile, if its process is known."""
     if pid is not None:
         return least_held_by(pid, seconds)
@@ -95,14 +83,14 @@ def _quiet(seconds: float, pid: int | None) -> Held | None:
     return None
 
 
-def _end(ended: threading.Event, threads: list[threading.Thread]) -> None:
+def _end(ended, threads):
     ended.set()
     for thread in threads:
         thread.join()
 
 
 @contextmanager
-def _attacking(address: Address, one_source: bool) -> Iterator[Callable[[Attack, float], None]]:
+def _attacking(address, one_source):
     """Attacks for so many seconds each, and for as long as they take to strike.
 
     They run in a process of their own, so that their threads keep no honest client waiting; in one
@@ -115,7 +103,7 @@ def _attacking(address: Address, one_source: bool) -> Iterator[Callable[[Attack,
     process.start()
     there.close()
 
-    def attack_for(attack: Attack, seconds: float) -> None:
+    def attack_for(attack, seconds):
         over.clear()
         struck.clear()
         here.send(attack)
@@ -125,9 +113,9 @@ def _attacking(address: Address, one_source: bool) -> Iterator[Callable[[Attack,
         try:
             here.recv()
         except EOFError:
-            raise RuntimeError(f"{attack.__name__} failed") from None
+            raise RuntimeError("an attack failed") from None
         if not has_struck:
-            raise RuntimeError(f"{attack.__name__} never struck")
+            raise RuntimeError("an attack never struck")
 
     try:
         yield attack_for
@@ -137,17 +125,17 @@ def _attacking(address: Address, one_source: bool) -> Iterator[Callable[[Attack,
         process.join()
 
 
-def _attack_in_turn(target: Target, over: Event, orders: Connection) -> None:
+def _attack_in_turn(target, over, orders):
     """Each attack that is sent, until it is over; then say so."""
     with suppress(EOFError):
         while True:
-            attack: Attack = orders.recv()
+            attack = orders.recv()
             attack(target, over)
             orders.send(None)
 
 
 @contextmanager
-def _probing(address: Address, tally: Tally, excused: int) -> Iterator[None]:
+def _probing(address, tally, excused):
     """The probe, in a process of its own: what it measures is the service, not its clients.
 
     An `excused` status is no mistake: of one source, attackers have the probe's own slots.
@@ -168,7 +156,7 @@ def _probing(address: Address, tally: Tally, excused: int) -> Iterator[None]:
         receiver.close()
 
 
-def _collect(receiver: Connection, tally: Tally, excused: int) -> None:
+def _collect(receiver, tally, excused):
     while True:
         try:
             status, seconds = receiver.recv()

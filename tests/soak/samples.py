@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import io
-import json
 import zipfile
 from dataclasses import dataclass
 
-from service.bodies import uploads
-from service.gltf.read.container import read_glb
-from service.meshfiles.convert import converted
-from service.meshfiles.formats import write
-from service.meshfiles.glb import triangles_glb
-from service.options import Limits, Options
-from tests.soak.bodies import a_part, small_body
+import numpy as np
 
-BOUNDARY = "a-soak-boundary"
-MULTIPART = f"multipart/form-data; boundary={BOUNDARY}"
+from service.bodies import uploads
+from service.meshfiles.convert import converted
+from service.meshfiles.example import part
+from service.meshfiles.formats import write
+from service.meshfiles.glb import as_gltf_json, triangles_glb
+from service.meshfiles.mesh_file import of_triangles
+from service.options import Limits, Options
+
+MULTIPART = "multipart/form-data; boundary=a-soak-boundary"
 OF_EACH = 3
 
 
@@ -33,13 +32,26 @@ class Sample:
     digest: str
 
 
-def samples() -> list[Sample]:
-    """`OF_EACH` of each format: GLB, glTF, archive, form, OBJ, PLY, STL and OFF."""
+def a_part(number):
+    """The example's part; no two numbers have one shape."""
+    mesh = part()
+    rng = np.random.default_rng(number)
+    moved = mesh.vertices + 1e-3 * rng.standard_normal(mesh.vertices.shape)
+    return of_triangles(moved, mesh.faces)
+
+
+def large_body():
+    """A part whose refinement takes seconds at four levels."""
+    return triangles_glb(a_part(99))
+
+
+def samples():
+    """`OF_EACH` of each format: GLB, glTF, archive, form, OBJ, PLY, STL, OFF and 3MF."""
     made = []
     for number in range(OF_EACH):
         mesh = a_part(number)
         glb = triangles_glb(mesh)
-        gltf = _as_gltf(glb)
+        gltf = as_gltf_json(glb, Limits())
         made += [
             _sample(f"glb-{number}", "model/gltf-binary", glb),
             _sample(f"gltf-{number}", "model/gltf+json", gltf),
@@ -51,38 +63,28 @@ def samples() -> list[Sample]:
     return made
 
 
-def small_sample() -> Sample:
+def small_sample():
     """A tetrahedron: what a small job is."""
-    return _sample("small", "model/gltf-binary", small_body())
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
+    return _sample("small", "model/gltf-binary", triangles_glb(of_triangles(vertices, faces)))
 
 
-def _sample(name: str, content_type: str, body: bytes) -> Sample:
-    options = Options(levels=1, scheme="loop")
-    limits = Limits()
+def _sample(name, content_type, body):
+    options, limits = Options(levels=1, scheme="loop"), Limits()
     sent = uploads.sent(body, content_type, limits)
     done = converted(sent.data, sent.kind, "glb", options, None, limits, siblings=sent.siblings)
     digest = hashlib.sha256(done.content).hexdigest()
     return Sample(name, "levels=1&scheme=loop", content_type, body, digest)
 
 
-def _as_gltf(glb: bytes) -> bytes:
-    container = read_glb(glb)
-    tree = json.loads(bytes(container.text))
-    data = base64.b64encode(container.binary or b"").decode()
-    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{data}"
-    return json.dumps(tree).encode()
-
-
-def _zip(gltf: bytes) -> bytes:
+def _zip(gltf):
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("part.gltf", gltf)
     return packed.getvalue()
 
 
-def _form(glb: bytes) -> bytes:
-    head = (
-        f'--{BOUNDARY}\r\nContent-Disposition: form-data; name="file"; filename="part.glb"\r\n'
-        "Content-Type: model/gltf-binary\r\n\r\n"
-    )
-    return head.encode() + glb + f"\r\n--{BOUNDARY}--\r\n".encode()
+def _form(glb):
+    head = b'--a-soak-boundary\r\nContent-Disposition: form-data; name="file"; filename="p.glb"'
+    return head + b"\r\n\r\n" + glb + b"\r\n--a-soak-boundary--\r\n"

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import torch
-from torch import nn
 
+from export.directed_graph import directed_bytes
 from pns_common.model.file import model_from_bytes
-from tests.support.networks import DEFAULT_CARD, HIDDEN, directed_file
+from tests.support.networks import DEFAULT_CARD, HIDDEN
 from train.models.directed import DirectedNet
 
 NUMBERS = {
@@ -29,26 +28,6 @@ def random_network(seed, scale=0.3, *, faces=False):
         for weights in net.parameters():
             weights.copy_(scale * torch.randn(weights.shape, generator=generator))
     return net.double().requires_grad_(False)
-
-
-def directed_bytes(network, card):
-    """The file of a network."""
-    size = 2 * network.width
-    encoder, *rounds, heads = (
-        [
-            (layer.weight.numpy().T, layer.bias.numpy())
-            for layer in part.modules()
-            if isinstance(layer, nn.Linear)
-        ]
-        for part in (network.encoder, *network.rounds, network.heads)
-    )
-    parts = [encoder]
-    for (weight, bias), last in rounds:
-        own, leaving, reaching = weight[:size], weight[size : 2 * size], weight[2 * size :]
-        told = np.concatenate([leaving, reaching], axis=1), np.concatenate([bias, 0 * bias])
-        parts += [[told], [(own, None), last]]
-    parts.append(heads)
-    return directed_file(parts, card)
 
 
 def directed_model_bytes(seed=0, scale=0.3, base="loop", **changes):

@@ -1,6 +1,7 @@
 """Meshes for tests: shapes with names, and hypothesis strategies for everything else."""
 
 import numpy as np
+import trimesh
 from hypothesis import strategies as st
 
 from pns_common import Mesh
@@ -10,16 +11,8 @@ TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
 def icosphere(subdivisions=1, radius=1.0):
     """Vertices on a sphere, faces anticlockwise from outside: closed, valences 5 and 6."""
-    t = (1 + 5**0.5) / 2
-    vertices = [[-1, t, 0], [1, t, 0], [-1, -t, 0], [1, -t, 0], [0, -1, t], [0, 1, t]]
-    vertices += [[0, -1, -t], [0, 1, -t], [t, 0, -1], [t, 0, 1], [-t, 0, -1], [-t, 0, 1]]
-    faces = [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4]]
-    faces += [[11, 10, 2], [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8]]
-    faces += [[3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1]]
-    points, faces = np.array(vertices, dtype=float), np.array(faces)
-    for _ in range(subdivisions):
-        points, faces = _midpoint_split(points, faces)
-    return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces
+    made = trimesh.creation.icosphere(subdivisions, radius)
+    return np.array(made.vertices), np.array(made.faces, dtype=np.int64)
 
 
 def bumpy_sphere(seed=0, subdivisions=1, bump=0.15):
@@ -39,17 +32,6 @@ def grid(n=6, height=None):
         [np.stack([v, v + n, v + n + 1], axis=1), np.stack([v, v + n + 1, v + 1], axis=1)]
     )
     return np.stack([x, y, z], axis=-1).reshape(-1, 3), faces
-
-
-def axis_planes():
-    """Uneven patches of planes across each of the three axes."""
-    vertices, faces = grid(6)
-    rng = np.random.default_rng(0)
-    for axis in range(3):
-        plane = vertices.copy()
-        plane[:, :2] += 0.1 * rng.standard_normal((len(plane), 2))
-        plane[:, 2] = rng.uniform(-5, 5)
-        yield Mesh(np.roll(plane, axis, axis=1), faces)
 
 
 def tilted_plane(seed):
@@ -131,23 +113,6 @@ def manifolds(draw):
     renumbered = np.empty_like(vertices)
     renumbered[order] = vertices
     return Mesh(renumbered, order[faces][rng.permutation(len(faces))])
-
-
-def _midpoint_split(points, faces):
-    """A slow and obvious 1-to-4 split, independent of the package."""
-    points, middle, out = points.tolist(), {}, []
-
-    def mid(i, j):
-        key = (min(i, j), max(i, j))
-        if key not in middle:
-            middle[key] = len(points)
-            points.append([(p + q) / 2 for p, q in zip(points[i], points[j], strict=True)])
-        return middle[key]
-
-    for a, b, c in faces.tolist():
-        ab, bc, ca = mid(a, b), mid(b, c), mid(c, a)
-        out += [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
-    return np.array(points), np.array(out)
 
 
 def block(cells=3, noise=0.0, seed=0, closed=True):

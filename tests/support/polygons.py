@@ -97,6 +97,15 @@ def envelope(mesh, budget, length):
     return budget / length * np.concatenate(means)
 
 
+def renumbered(mesh, seed):
+    """Return other vertex numbers, another order of faces and first corner of each; v's numbers."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(mesh.vertices))
+    faces = [np.roll(order[face], rng.integers(9)).tolist() for face in rows_of(mesh)]
+    points = mesh.vertices[np.argsort(order)]
+    return Mesh(points, [faces[f] for f in rng.permutation(len(faces))]), order
+
+
 def correspondence(mesh, other, order):
     """Find where each new vertex of a mesh is in another with vertex ``order[v]`` for v."""
     ours, theirs = mesh.topology(), other.topology()

@@ -48,10 +48,6 @@ def stay_away(seconds: float, model: object) -> None:
     time.sleep(seconds)
 
 
-def fails_to_warm_up(model: object) -> None:
-    raise NoModelError("no such thing")
-
-
 def obey(work: Work) -> Done:
     """`sleep 2`, `die`, `hold`, … as the body says; anything else is echoed."""
     body = Path(work.body).read_bytes()
@@ -205,10 +201,6 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def descriptors() -> int:
-    return len(list(Path("/proc/self/fd").iterdir()))
-
-
 def hold() -> None:
     re.match(r"(a+)+$", "a" * 40 + "b")
 
@@ -223,14 +215,6 @@ def wait_between(folder: Path) -> int:
     tell(folder / "begun")
     wait_for(folder / "go")
     return os.getpid()
-
-
-def fault() -> None:
-    raise UnpicklableError(lambda: None)
-
-
-def refuse() -> None:
-    raise GltfError("no", pointer="/meshes/0")
 
 
 def nothing() -> None:

@@ -47,17 +47,9 @@ def failures(verdict):
 
 
 def nan_bytes():
-    """0 · log(−1) for every row."""
-    nodes = [
-        helper.make_node("ReduceSum", ["features", "last"], ["sum"], keepdims=1),
-        helper.make_node("Abs", ["sum"], ["size"]),
-        helper.make_node("Neg", ["size"], ["below"]),
-        helper.make_node("Sub", ["below", "one"], ["negative"]),
-        helper.make_node("Log", ["negative"], ["nan"]),
-        helper.make_node("Mul", ["nan", "budget"], ["scaled"]),
-        helper.make_node("Concat", ["scaled", "scaled", "scaled"], ["correction"], axis=1),
-    ]
-    return model_bytes(nodes, {"last": np.array([1]), "one": 1.0})
+    """A perceptron with a bias of NaN."""
+    (weight, bias), *rest = random_layers(0)
+    return perceptron_bytes([(weight, bias * np.nan), *rest])
 
 
 def test_the_papers_model_passes():

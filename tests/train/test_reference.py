@@ -190,7 +190,7 @@ def test_a_step_of_directed_edges_agrees(both, budget):
     }
     rule = formula.DirectedRule(networks, **numbers)
     scheme = Scheme("pns", LOOP, rule, learned_levels=1)
-    made = formula.directed_level(with_sharp_edges(level, Creases(learned=True), scheme), rule)
+    made = rule(with_sharp_edges(level, Creases(learned=True), scheme))
     step = DirectedRule(net, **numbers)(points, mesh)
     np.testing.assert_allclose(step.base, made.points - made.displacement, rtol=0, atol=1e-4)
     np.testing.assert_allclose(step.points, made.points, rtol=0, atol=1e-4)

@@ -26,30 +26,23 @@ def drawing():
     return figure
 
 
-class Counting:
-    """An experiment that counts its runs."""
+@pytest.fixture
+def runs():
+    """A line for each run of the experiment."""
+    return []
 
-    def __init__(self):
-        self.runs = 0
 
-    def __call__(self, laboratory):
-        self.runs += 1
+@pytest.fixture
+def experiment(runs):
+    def run(laboratory):
+        runs.append(laboratory)
         rows = (("third | column", 1 / 3, None), ("negative", -2.0, "≈ π"))
+        table = Table("counted", "Counted", COLUMNS, rows)
         return Outcome(
-            (Table("counted", "Counted", COLUMNS, rows),),
-            (Figure("line", "A line.", drawing),),
-            ("A note [with brackets].",),
+            (table,), (Figure("line", "A line.", drawing),), ("A note [with brackets].",)
         )
 
-
-@pytest.fixture
-def counting():
-    return Counting()
-
-
-@pytest.fixture
-def experiment(counting):
-    return Experiment("counting", "Counting runs", "Here.", counting, 1.0)
+    return Experiment("counting", "Counting runs", "Here.", run, 1.0)
 
 
 def laboratory(tmp_path, scale=SMALL, checkpoints=None, published=None):
@@ -57,23 +50,23 @@ def laboratory(tmp_path, scale=SMALL, checkpoints=None, published=None):
 
 
 def test_a_finished_experiment_is_run_again_where_anything_of_it_is_another(
-    tmp_path, counting, experiment
+    tmp_path, runs, experiment
 ):
-    def run(**options):
-        return reproduce(experiment, laboratory(tmp_path), tmp_path, **options), counting.runs
+    def run(scale=SMALL, **options):
+        made = reproduce(experiment, laboratory(tmp_path, scale), tmp_path, **options)
+        return made, len(runs)
 
-    first, runs = run()
-    assert (run(), runs) == ((first, 1), 1)
+    first, _ = run()
+    assert run() == (first, 1)
     assert run(force=True)[1] == 2
     record = tmp_path / "cache" / "counting.json"
-    for number, path in enumerate(("counted.csv", "figures/line.pdf"), start=3):
+    for count, path in enumerate(("counted.csv", "figures/line.pdf"), start=3):
         (tmp_path / path).unlink()
-        assert run()[1] == number
+        assert run()[1] == count
     record.write_text("{}")
     assert read_record(record) is None
     assert run()[1] == 5
-    reproduce(experiment, laboratory(tmp_path, scale=replace(SMALL, levels=3)), tmp_path)
-    assert counting.runs == 6
+    assert run(replace(SMALL, levels=3))[1] == 6
 
 
 def test_code_and_weights_that_are_given_count_as_inputs(tmp_path, monkeypatch, experiment):
@@ -121,29 +114,26 @@ def test_an_experiment_without_a_record_keeps_its_section_of_the_page(tmp_path, 
     whole = markdown_page(known, {"before": record, "counting": record, "after": record})
     old = whole.replace("-2.00", "-1.00")
     page = markdown_page(known, {"counting": record}, old)
-    assert [line for line in page.splitlines() if line.startswith("## ")] == [
-        "## before",
-        "## Counting runs",
-        "## after",
-    ]
+    titles = [line for line in page.splitlines() if line.startswith("## ")]
+    assert titles == ["## before", "## Counting runs", "## after"]
     assert (page.count("-1.00"), page.count("-2.00")) == (2, 1)
     assert markdown_page(known, {}, whole) == whole
 
 
 def test_figures_are_the_same_bytes_every_time(tmp_path, experiment):
-    reproduce(experiment, laboratory(tmp_path), tmp_path / "a")
-    reproduce(experiment, laboratory(tmp_path), tmp_path / "b")
-    for name in ("line.png", "line.pdf"):
-        here, there = (tmp_path / side / "figures" / name for side in "ab")
-        assert here.read_bytes() == there.read_bytes()
-        assert here.read_bytes().startswith({".png": b"\x89PNG", ".pdf": b"%PDF"}[here.suffix])
+    for side in "ab":
+        reproduce(experiment, laboratory(tmp_path), tmp_path / side)
+    for name, kind in (("line.png", b"\x89PNG"), ("line.pdf", b"%PDF")):
+        here, there = ((tmp_path / side / "figures" / name).read_bytes() for side in "ab")
+        assert here == there
+        assert here.startswith(kind)
 
 
 def invoke(*arguments):
     return CliRunner().invoke(train.run.app, ["reproduce", *map(str, arguments)])
 
 
-def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, experiment):
+def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, runs, experiment):
     needing = replace(experiment, name="needing", needs_published=True)
     monkeypatch.setattr(command, "EXPERIMENTS", {"counting": experiment, "needing": needing})
     for arguments, named in (
@@ -160,7 +150,7 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path, monkeypatch, counting, 
     lines = listed.output.splitlines()
     assert [line.split()[0] for line in lines] == ["counting", "needing"]
     assert lines[1].endswith("needs --published DIR)")
-    assert counting.runs == 0
+    assert not runs
 
 
 def test_what_an_experiment_cannot_use_is_told_and_ends_the_command(tmp_path, monkeypatch):

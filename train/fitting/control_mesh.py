@@ -219,11 +219,8 @@ def _axes(level: Level) -> Float[np.ndarray, "D 3 3"]:
     heads, made = np.zeros((3, 2 * count, kernels.FACE)), np.empty((3, 2 * count, 3))
     for axis in range(3):
         heads[axis, :, kernels.VERTEX + axis] = 1.0
-        kernels.read_heads(
-            *(level.points, level.normals, level.rings.fields, mesh.corners, mesh.face_of_corner),
-            *(mesh.edges, mesh.half_edges, mesh.edge_class, heads[axis], 0, count),
-            *(np.empty((count, 3)), made[axis], np.empty(count)),
-        )
+        read = level.points, level.normals, level.rings.fields, mesh.connectivity, heads[axis]
+        kernels.read_heads(0, count, *read, np.empty((count, 3)), made[axis], np.empty(count))
     return by_way(np.ascontiguousarray(made.transpose(1, 0, 2)))
 
 

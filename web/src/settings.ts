@@ -9,16 +9,24 @@ export interface Settings {
   /** C, dimensionless; null: the model's own. */
   budget: number | null;
   limit: boolean;
-  crease: "auto" | "angle" | "normals" | "off";
+  crease: (typeof CHOICES.crease)[number];
   /** Degrees. */
   angle: number;
-  uv: "linear" | "smooth";
+  uv: (typeof CHOICES.uv)[number];
   /** Join vertices that nearly coincide. */
   weld: boolean;
   /** Join a glTF's triangles that are one polygon, and refine quads. */
   polygons: boolean;
-  normals: "auto" | "keep" | "smooth";
+  normals: (typeof CHOICES.normals)[number];
 }
+
+/** Settings that are one of several words, and those that are on or off: the form has a field for each. */
+export const CHOICES = {
+  crease: ["auto", "angle", "normals", "off"],
+  uv: ["linear", "smooth"],
+  normals: ["auto", "keep", "smooth"],
+} as const;
+export const SWITCHES = ["limit", "weld", "polygons"] as const;
 
 /** Settings for one file, and those that the user wants for any file: a large file may close levels. */
 export interface Asked {
@@ -127,18 +135,16 @@ export function toHash(settings: Settings, view: Record<string, string>): string
 export function fromHash(hash: string): { settings: Settings; view: Record<string, string> } {
   const given = Object.fromEntries(new URLSearchParams(hash.replace(/^#/, "")));
   const settings = { ...DEFAULTS };
-  const { levels, faces, model, budget, limit, crease, angle, uv, weld, polygons, normals, ...view } = given;
+  const { levels, faces, model, budget, angle, ...others } = given;
   settings.levels = whole(levels, 1, 6) ?? settings.levels;
   settings.faces = whole(faces, 1, Infinity);
   settings.model = model ?? settings.model;
   settings.budget = number(budget, 0, Infinity);
-  settings.limit = limit !== "false";
-  settings.crease = oneOf(crease, ["auto", "angle", "normals", "off"]) ?? settings.crease;
   settings.angle = number(angle, 0, 180) ?? settings.angle;
-  settings.uv = oneOf(uv, ["linear", "smooth"]) ?? settings.uv;
-  settings.weld = weld === "true";
-  settings.polygons = polygons === "true";
-  settings.normals = oneOf(normals, ["auto", "keep", "smooth"]) ?? settings.normals;
+  const words = Object.entries(CHOICES).map(([name, choices]) => [name, choices.find((choice) => choice === given[name])]);
+  const flags = SWITCHES.map((name) => [name, ({ true: true, false: false } as Record<string, boolean>)[given[name] ?? ""]]);
+  Object.assign(settings, Object.fromEntries([...words, ...flags].filter(([, value]) => value !== undefined)));
+  const view = Object.fromEntries(Object.entries(others).filter(([name]) => !(name in DEFAULTS)));
   return { settings, view };
 }
 
@@ -150,8 +156,4 @@ function number(text: string | undefined, least: number, most: number): number |
 function whole(text: string | undefined, least: number, most: number): number | null {
   const value = number(text, least, most);
   return value !== null && Number.isInteger(value) ? value : null;
-}
-
-function oneOf<T extends string>(text: string | undefined, choices: readonly T[]): T | null {
-  return choices.find((choice) => choice === text) ?? null;
 }

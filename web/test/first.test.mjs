@@ -463,7 +463,7 @@ function advised(body, advice) {
   const begin = text.indexOf("glTF");
   const whole = body.subarray(begin, begin + body.readUInt32LE(begin + 8));
   const { json, bin } = read(whole);
-  json.asset.extras.pns.advice = [advice];
+  json.asset.extras.pns.advice = [{ text: advice, options: ["crease=off", "crease=angle:40"] }];
   const changed = write({ json, bin });
   const head = text.slice(0, begin).replace(`: ${whole.length}\r\n`, `: ${changed.length}\r\n`);
   return Buffer.concat([Buffer.from(head, "latin1"), changed, body.subarray(begin + whole.length)]);

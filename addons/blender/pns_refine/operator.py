@@ -39,7 +39,7 @@ PASSED_ON = {
 def made_count(objects: list[bpy.types.Object], settings: Settings) -> int:
     """Return how many faces there will be, at most where that is what is asked for.
 
-    A tolerance counts as whole levels.
+    A tolerance or an angle counts as whole levels.
     """
     if settings.detail == "FACES":
         return settings.max_faces * len(objects)
@@ -310,8 +310,7 @@ def draw_forecast(
     text = {
         "LEVELS": f"{made:,} faces from {faces:,}",
         "FACES": f"At most {made:,} faces, from {faces:,}",
-        "TOLERANCE": f"As many faces as that takes, from {faces:,}",
-    }[settings.detail]
+    }.get(settings.detail, f"As many faces as that takes, from {faces:,}")
     if settings.detail != "LEVELS" and not all(map(is_triangles, objects)):
         text = "Detail is for triangles: quads are cut everywhere"
     layout.label(text=text, icon="INFO")

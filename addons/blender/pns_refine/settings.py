@@ -18,7 +18,7 @@ from .refining.compute import Choice
 
 NO_ANGLE = math.pi
 # The property that each choice of detail asks for.
-GOAL_OF = {"LEVELS": "levels", "FACES": "max_faces", "TOLERANCE": "tolerance"}
+GOAL_OF = {"LEVELS": "levels", "FACES": "max_faces", "TOLERANCE": "tolerance", "ANGLE": "angle"}
 # Rules of boundaries by the names of Blender's Subdivision Surface.
 BORDERS = {"ALL": "smooth", "PRESERVE_CORNERS": "corners"}
 # What stays linear of UV maps, by its names and by ours.
@@ -77,6 +77,11 @@ class Settings:
                 "Where faces would be farther from the smooth surface than "
                 "a share of the mesh's size. For triangles",
             ),
+            (
+                "ANGLE",
+                "Angle",
+                "Where shading turns more over a face than an angle. For triangles",
+            ),
         ),
         default="LEVELS",
     )
@@ -98,6 +103,14 @@ class Settings:
         soft_max=5.0,
         max=100.0,
         precision=3,
+    )
+    angle: FloatProperty(
+        name="Angle",
+        description="How far shading may turn over a face",
+        subtype="ANGLE",
+        default=math.radians(10),
+        min=math.radians(0.1),
+        max=math.radians(179),
     )
     levels: IntProperty(
         name="Levels",
@@ -228,5 +241,6 @@ def choice_of(settings: Settings) -> Choice:
         border=BORDERS[settings.border],
         uv_keep=UV_KEPT[settings.uv_smooth],
         tolerance=f"{settings.tolerance}%" if settings.detail == "TOLERANCE" else None,
+        angle=math.degrees(settings.angle) if settings.detail == "ANGLE" else None,
         max_faces=settings.max_faces if settings.detail == "FACES" else None,
     )

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+from ...changes import Change
 from ...errors import GltfError, UnsupportedFeature
-from ...report import Change
 from ..constants import COMPONENT_TYPES, FLOAT, SURFACES, UNSIGNED_BYTE, UNSIGNED_SHORT
 from .accessors import QUANTIZATION, allowed, is_dequantised, needs_extension
 from .container import escaped
@@ -54,7 +54,7 @@ def breaches(document: Document) -> list[Change]:
     for what, pointer in _all(document):
         first.setdefault(what, pointer)
         counts[what] = counts.get(what, 0) + 1
-    return [Change(first[what], f"found, and left: {what}", counts[what]) for what in counts]
+    return [Change(first[what], "breach", counts[what], (what,)) for what in counts]
 
 
 def _all(document: Document) -> Iterator[tuple[str, str]]:

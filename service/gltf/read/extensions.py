@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ...report import Change
+from ...changes import Change
 from ..constants import OUTLINE, SURFACES, TRIANGLES
 
 _LISTS = ("extensionsUsed", "extensionsRequired")
@@ -83,8 +83,7 @@ def _leave_out(tree: dict[str, Any], name: str) -> list[Change]:
             stays = True
             continue
         drop(mesh, name)
-        what = f"left out: {name}, by the numbers of vertices"
-        changes.append(Change(f"/meshes/{number}", what, 1))
+        changes.append(Change(f"/meshes/{number}", "numbers-of-vertices", 1, (name,)))
     if changes and not stays:
         withdraw(tree, name)
     return changes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -107,20 +107,22 @@ def check_cost(
     document: Document,
     plans: Sequence[MeshPlan],
     size: int,
-    levels: int,
+    faces_after: Callable[[int], int],
     limits: Limits,
     bytes_per_face: int = 0,
 ) -> None:
-    """Check the number of refined faces and their memory.
+    """Check the number of refined faces, as of `faces_after` triangles, and their memory.
 
     `size` is the upload's in bytes; writing takes `bytes_per_face` in addition.
 
     Raises:
         LimitError: over `max_faces` or `max_memory_bytes`.
     """
-    faces = sum(mesh.faces for mesh in plans) * 4**levels
+    triangles = sum(mesh.faces for mesh in plans)
+    faces = faces_after(triangles)
     check_limit("faces", faces, limits.max_faces, f"the refined file would have {faces} faces")
-    memory = predicted_memory(document, plans, size, levels) + faces * bytes_per_face
+    growth = faces / max(triangles, 1)
+    memory = predicted_memory(document, plans, size, growth) + faces * bytes_per_face
     check_memory(memory, limits)
 
 
@@ -157,8 +159,10 @@ def repeated_text(tree: dict[str, Any], document: Document) -> int:
     )
 
 
-def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, levels: int) -> int:
-    """Return an upper bound of the peak memory in bytes."""
+def predicted_memory(
+    document: Document, plans: Sequence[MeshPlan], size: int, growth: float
+) -> int:
+    """Return an upper bound of the peak memory in bytes, where a face becomes ``growth`` faces."""
     total = BYTES_PER_INPUT_BYTE * size
     for mesh in plans:
         primitives = [document.meshes[mesh.mesh].primitives[number] for number in mesh.primitives]
@@ -172,12 +176,12 @@ def predicted_memory(document: Document, plans: Sequence[MeshPlan], size: int, l
             still = targets - sum("POSITION" in target for target in primitive.targets)
             width += still * BYTES_PER_POSITION
             before = triangle_count(_corner_count(document, primitive), primitive.mode, "")
-            faces = before * 4**levels
+            faces = round(before * growth)
             total += BYTES_PER_PRIMITIVE + targets * BYTES_PER_TARGET
             total += faces * (BYTES_PER_FACE + BYTES_PER_VERTEX_BYTE * width)
             if targets or sets:
                 count = document.accessors[primitive.attributes["POSITION"]].count
-                following = _refined_vertices(before, min(count, 3 * before), levels)
+                following = _refined_vertices(before, min(count, 3 * before), growth)
                 total += following * BYTES_PER_FOLLOWING_VERTEX * max(sets, 1)
     return total
 
@@ -187,14 +191,14 @@ def joint_sets(attributes: Iterable[str]) -> int:
     return sum(name.startswith("JOINTS_") for name in attributes)
 
 
-def _refined_vertices(faces: int, vertices: int, levels: int) -> int:
-    """Return an upper bound of a mesh's vertices after some levels, by Euler's formula.
+def _refined_vertices(faces: int, vertices: int, growth: float) -> int:
+    """Return an upper bound of a mesh's vertices when it has grown, by Euler's formula.
 
     A closed mesh has 3/2 edges a face, and no mesh more than three.
     """
-    inside = 2**levels - 1  # vertices on an edge
+    inside = growth**0.5 - 1  # vertices on an edge
     edges = min(3 * faces, max(3 * faces // 2, vertices + faces))
-    return vertices + inside * edges + inside * (inside - 1) // 2 * faces
+    return round(vertices + inside * edges + inside * (inside - 1) / 2 * faces)
 
 
 def _corner_count(document: Document, primitive: Primitive) -> int:

@@ -164,13 +164,13 @@ def compact(
 
 def distinct_corners(
     primitive: TrianglePrimitive,
-    corners: Int[np.ndarray, "F 3"],
+    corners: Int[np.ndarray, "*H"],
     welded: Int[np.ndarray, " N"],
-) -> tuple[Int[np.ndarray, "F 3"], Int[np.ndarray, " C"]]:
+) -> tuple[Int[np.ndarray, "*H"], Int[np.ndarray, " C"]]:
     """Join rows that agree in position and in all attributes and morph targets.
 
     `welded` is the welded vertex of each row; rows of one agree in position, position deltas and
-    skin. Returns the distinct corners of each face, numbered by first appearance, and for each
+    skin. Returns the distinct corner at each corner, numbered by first appearance, and for each
     distinct corner a row of the attributes.
     """
     others = [
@@ -182,4 +182,4 @@ def distinct_corners(
     words = np.hstack([welded.astype(np.uint32)[:, None], *(as_words(o) for o in others)])
     flat = corners.reshape(-1)
     distinct, first = number_by_first_appearance(distinct_rows(words)[flat])
-    return distinct.reshape(-1, 3), flat[first]
+    return distinct.reshape(corners.shape), flat[first]

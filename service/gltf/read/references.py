@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ...changes import Change
 from ...errors import GltfError
-from ...report import Change
 from ..constants import COMPONENT_TYPES, OUTLINE, UNSIGNED_INTEGERS
 from .accessors import element_size
 from .container import escaped
@@ -196,7 +196,7 @@ def check_nodes(document: Document) -> list[Change]:
             refer(root, document.nodes, f"/scenes/{number}/nodes/{place}")
     if not several:
         return []
-    return [Change(several[0], "found, and left: nodes with more than one parent", len(several))]
+    return [Change(several[0], "breach", len(several), ("nodes with more than one parent",))]
 
 
 def mesh_instances(document: Document) -> list[int]:

@@ -8,8 +8,8 @@ from typing import Any
 from urllib.parse import quote
 
 from ...bodies.sibling_files import Opened, has_scheme
+from ...changes import Change
 from ...errors import GltfError
-from ...report import Change
 from .compressed import needed_buffers
 from .schema import Buffer, Document
 
@@ -104,19 +104,20 @@ def embed_images(
         if content is None:
             if not has_scheme(image.uri):
                 # Beside the result this name may lead to no file.
-                changes.append(Change(pointer, _why_not(image.uri, opened), 1))
+                why = _why_not(image.uri, opened)
+                changes.append(Change(pointer, "kept-by-uri", 1, (why,)))
             continue
         kind = mime_type(content)
         if kind is None:
             if not is_data(image.uri):
-                what = f"kept by its URI: {image.uri} is no known type of image"
-                changes.append(Change(pointer, what, 1))
+                why = f"{image.uri} is no known type of image"
+                changes.append(Change(pointer, "kept-by-uri", 1, (why,)))
             continue
         extension = _EXTENSION_OF[kind]
         if extension is not None and extension not in document.extensions_used:
             # Embedded, it would need a type that the file does not declare.
-            what = f"kept by its URI: {kind} without the extension {extension}"
-            changes.append(Change(pointer, what, 1))
+            why = f"{kind} without the extension {extension}"
+            changes.append(Change(pointer, "kept-by-uri", 1, (why,)))
             continue
         entry = tree["images"][number]
         del entry["uri"]
@@ -149,8 +150,8 @@ def _image_bytes(uri: str, opened: Opened) -> memoryview | None:
 
 def _why_not(uri: str, opened: Opened) -> str:
     if opened.name_of(uri) is None:
-        return f"kept by its URI: {uri} leads out of the document's folder"
-    return f"kept by its URI: {uri} did not come with the document"
+        return f"{uri} leads out of the document's folder"
+    return f"{uri} did not come with the document"
 
 
 def is_data(uri: str) -> bool:

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, TypeVar
 import msgspec
 from msgspec import Meta
 
+from ...changes import Change
 from ...errors import GltfError
-from ...report import Change
 from ..constants import OUTLINE
 
 # Above every size of a file, and the range in which doubles tell integers apart.
@@ -249,8 +249,7 @@ def lenient_view(tree: dict[str, Any]) -> tuple[Document, list[Change]]:
         first = error
     if not _floats_made_whole(tree):
         raise first
-    what = "found, and read as integers: integers that are written with a fraction, as 3.0"
-    return view(tree), [Change(first.pointer or "", what, 1)]
+    return view(tree), [Change(first.pointer or "", "whole-floats", 1)]
 
 
 def view(tree: dict[str, Any]) -> Document:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from ...bodies.media import GLTF_KINDS
 from ...bodies.sibling_files import ALONE, Opened, SiblingFiles, has_scheme
+from ...changes import Change, counted
 from ...errors import ServiceError
 from ...options import BYTES_PER_INPUT_BYTE, Limits
-from ...report import Change
 from .checks import breaches, refuse_features, refuse_version
 from .compressed import decode_primitives, decode_views
 from .container import Container, decode_object, decoded_size, read_container
@@ -49,14 +49,15 @@ class Upload:
 def read_upload(
     data: bytes,
     media: Media,
-    levels: int,
+    faces_after: Callable[[int], int],
     limits: Limits,
     siblings: SiblingFiles = ALONE,
     bytes_per_face: int = 0,
 ) -> Upload:
     """Read and check a file, each part after those that it depends on.
 
-    Writing takes `bytes_per_face` for each refined face, in addition to refining.
+    `faces_after` returns how many faces triangles become. Writing takes `bytes_per_face` for each
+    of them, in addition to refining.
 
     Raises:
         ServiceError: the file is unreadable, invalid, over a limit, or cannot be refined.
@@ -84,25 +85,18 @@ def read_upload(
     unknown = unknown_extensions(tree, container.text)
     changes += _changes_of_buffers(tree.get("buffers", [])[:stored], files, unknown)
     changes += numbered
-    changes += [
-        Change(pointer, what, count)
-        for pointer, what, count in (
-            ("/bufferViews", "meshopt compression decoded", len(ranges)),
-            ("/meshes", "Draco compression decoded", len(draco_views)),
-        )
-        if count
-    ]
+    changes += counted({"meshopt-decoded": len(ranges)}, "/bufferViews")
+    changes += counted({"draco-decoded": len(draco_views)}, "/meshes")
     changes += images
-    if container.tail:
-        changes.append(Change("", "bytes behind the GLB left out", container.tail))
-    changes += [Change("", f"not used by the document: {name}", 1) for name in opened.unused]
+    told = {("unused-file", name): 1 for name in opened.unused}
+    changes += counted({"bytes-behind": container.tail, **told})
     changes += check_nodes(document)
     changes += breaches(document)
     refuse_features(document)
     plans = plan(document)
     size += sum(len(buffer) for buffer in buffers[stored:])
     size += repeated + decoded_size(container.text) // BYTES_PER_INPUT_BYTE
-    check_cost(document, plans, size, levels, limits, bytes_per_face)
+    check_cost(document, plans, size, faces_after, limits, bytes_per_face)
     leavable = spare(original, draco_views, ranges, unknown)
     return Upload(container, tree, document, buffers, plans, changes, leavable)
 
@@ -111,15 +105,15 @@ def _changes_of_buffers(
     entries: Sequence[dict[str, Any]], files: int, unknown: Sequence[str]
 ) -> list[Change]:
     """Return the changes of joining buffers into one."""
-    changes = [Change("/buffers", "joined into one", files)] if files > 1 else []
+    changes = [Change("/buffers", "buffers-joined", files)] if files > 1 else []
     if changes and unknown:
         names = ", ".join(unknown)
-        changes.append(Change("/buffers", f"joined: {names} may name them by number", files))
+        changes.append(Change("/buffers", "buffers-numbered", files, (names,)))
     for number, entry in enumerate(entries[1:], 1):
         lost = sorted(entry.keys() - {"uri", "byteLength"})
         if lost:
-            what = f"left out, since buffers are one: {', '.join(lost)}"
-            changes.append(Change(f"/buffers/{number}", what, 1))
+            names = ", ".join(lost)
+            changes.append(Change(f"/buffers/{number}", "buffer-properties", 1, (names,)))
     return changes
 
 

@@ -7,29 +7,30 @@ normals are those of the surface that it makes, and its tangents are perpendicul
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common.carry.carried import in_type_of
-from pns_common.carry.grid import rounded_rows
+from pns_common.carry.rows import rounded_rows
+from pns_common.mesh.creases import Creases
 from pns_common.mesh.normals import opposed_corners, perpendicular_tangents
 from pns_common.mesh.rows import cross, dot, marked, unit
 from pns_common.parallel import Blocks, available_threads
 
-from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import blocks_of, split_connectivity
-from ...meshes.uv_charts import UvBlend
+from ...options import Options
 from ...stages import Stages
 from ..read.primitives import TrianglePrimitive, distinct_corners
 from ..read.schema import Accessor
-from .control_mesh import ControlMesh, refined_ids, slices
+from .control_mesh import ControlMesh
 from .mesh_refine import RefinedMesh
 from .normals import Shading, safe_unit, shade
-from .selection import Cut, cut_triangles, keep_still, with_still
+from .selection import keep_still
 from .skin import SkinAndMorph, skin_attributes
+from .split import Values, WholeLevels
 
 # Share of the progress that normals take.
 SHADING = 0.85
@@ -64,8 +65,7 @@ class Vertices:
 
     Attributes:
         row: (C,) a row of the primitive's attributes for each distinct corner.
-        vertex: (C,) the vertex of the control mesh at each corner.
-        connectivity: how corners spread over refined vertices.
+        values: refines values of distinct corners.
         positions, normals: refined, in the types written; normals None if there are none.
         exact_normals: in float64, for tangents; None if the primitive lacks either.
         skin_and_morph: skin binding and morph deltas.
@@ -73,8 +73,7 @@ class Vertices:
     """
 
     row: Int[np.ndarray, " C"]
-    vertex: Int[np.ndarray, " C"]
-    connectivity: Blending
+    values: Values
     positions: Float[np.ndarray, "N 3"]
     normals: Float[np.ndarray, "N 3"] | None
     exact_normals: Float[np.ndarray, "N 3"] | None
@@ -85,26 +84,18 @@ class Vertices:
 def refined_primitives(
     control: ControlMesh,
     refined: RefinedMesh,
-    grid: BarycentricGrid,
-    uv_blend: UvBlend,
+    creases: Creases,
+    options: Options,
     stages: Stages,
-    cut: Cut | None = None,
-    ids: Int[np.ndarray, "P T"] | None = None,
 ) -> list[RefinedPrimitive]:
     """Return the refined primitives; primitives without faces are left out.
 
-    `ids` are the refined vertices at the grid points of the kept faces, if they are known.
+    `creases` are those of the mesh that was refined, by name.
     """
-    if ids is None:
-        ids = refined_ids(control.weld, control.cleaned, refined.mesh, grid)
-    ends = slices(control.kept_counts)
-    if cut is not None:
-        refined = with_still(refined, control, cut, ids, grid)
     with stages.part(0.0, SHADING):
         shading = shade(
             control,
-            [ids[rows] for rows in ends],
-            grid,
+            refined.split,
             refined.mesh.vertices,
             refined.skin_and_morph,
             refined.limit_normals,
@@ -112,38 +103,53 @@ def refined_primitives(
         )
     made: list[RefinedPrimitive] = []
     with stages.part(SHADING, 1.0):
-        for number, rows in enumerate(ends):
-            stages.reach(rows.start / len(ids))
-            if rows.stop > rows.start:
-                own = ids[rows]
-                part = None if cut is None else Cut(cut.kind[rows], cut.still)
-                each = _refined_primitive(
-                    control, number, own, grid, refined, shading, uv_blend, part
-                )
-                before = None
-                if control.authored or control.own is not None:
-                    before = control.primitives[number].corners[control.kept[number]]
-                made.append(facing(each, before))
+        for number, share in enumerate(control.shares):
+            stages.reach(number / len(control.shares))
+            if share.stop > share.start:
+                asked = control, number, refined, shading, creases, options
+                made.append(facing(_refined_primitive(*asked), _opposed_before(control, number)))
     return made
 
 
-def facing(refined: RefinedPrimitive, before: Int[np.ndarray, "P 3"] | None) -> RefinedPrimitive:
+def _opposed_before(
+    control: ControlMesh, number: int
+) -> Callable[[], Bool[np.ndarray, " Q"]] | None:
+    """Return what finds kept faces with a normal of the author's that points away; None: none is.
+
+    Such a normal is meant to.
+    """
+    if not control.authored:
+        return None
+
+    def opposed() -> Bool[np.ndarray, " Q"]:
+        primitive, kept, share = control.primitives[number], control.faces, control.shares[number]
+        old, triangles = primitive.attributes, primitive.corners[control.kept[number]]
+        blocks = Blocks(available_threads())
+        wrong = opposed_corners(old["POSITION"], old["NORMAL"], triangles, blocks)
+        begin, end = kept.offsets[[share.start, share.stop]]
+        own = kept.corners[begin:end] // 3 - sum(control.kept_counts[:number])
+        starts = kept.offsets[share.start : share.stop] - begin
+        made: Bool[np.ndarray, " Q"] = np.logical_or.reduceat(wrong[own].any(axis=1), starts)
+        return made
+
+    return opposed
+
+
+def facing(
+    refined: RefinedPrimitive, before: Callable[[], Bool[np.ndarray, " Q"]] | None
+) -> RefinedPrimitive:
     """Return a refined primitive of which no normal points away from its face's front.
 
     At a child face that turned over, the normal and its tangent are mirrored, in a row of their
-    own. `before` are the faces whose normals are the author's: where one of these pointed away, it
-    is meant to, and so are those of its children.
+    own; those of faces where `before` says that one pointed away stay.
     """
     attributes, blocks = refined.attributes, Blocks(available_threads())
     if "NORMAL" not in attributes:
         return refined
     points, normals = attributes["POSITION"], attributes["NORMAL"]
     opposed = opposed_corners(points, normals, refined.faces, blocks)
-    if before is not None and opposed.any():
-        old = refined.source.attributes
-        meant = opposed_corners(old["POSITION"], old["NORMAL"], before, blocks).any(axis=1)
-        counts = len(opposed) // len(before) if refined.counts is None else refined.counts
-        opposed &= ~np.repeat(meant, counts)[:, None]
+    if before is not None and refined.counts is not None and opposed.any():
+        opposed &= ~np.repeat(before(), refined.counts)[:, None]
     if not opposed.any():
         return refined
     face, corner = np.nonzero(opposed)
@@ -165,94 +171,102 @@ def facing(refined: RefinedPrimitive, before: Int[np.ndarray, "P 3"] | None) -> 
         targets.append(own)
     faces = refined.faces.copy()
     faces[face, corner] = len(points) + np.arange(len(rows))
-    # A row may have been those corners' alone.
-    used = np.flatnonzero(marked(faces.reshape(-1), len(points) + len(rows)))
     pairs = zip((attributes, *refined.targets), (more, *targets), strict=True)
     attributes, *targets = (
-        {name: np.concatenate([values, new[name]])[used] for name, values in old.items()}
+        {name: np.concatenate([values, new[name]]) for name, values in old.items()}
         for old, new in pairs
     )
-    vertex = refined.vertex
-    return replace(
-        refined,
-        faces=np.searchsorted(used, faces),
-        attributes=attributes,
-        targets=targets,
-        vertex=None if vertex is None else np.append(vertex, vertex[rows])[used],
-    )
+    vertex = None if refined.vertex is None else np.append(refined.vertex, refined.vertex[rows])
+    mirrored = replace(refined, attributes=attributes, targets=targets, vertex=vertex)
+    # A row may have been those corners' alone.
+    used = marked(faces.reshape(-1), len(points) + len(rows))
+    return with_rows(replace(mirrored, faces=faces), np.flatnonzero(used))
 
 
 def _refined_primitive(
     control: ControlMesh,
     number: int,
-    ids: Int[np.ndarray, "F T"],
-    grid: BarycentricGrid,
     refined: RefinedMesh,
     shading: Shading | None,
-    uv_blend: UvBlend,
-    cut: Cut | None,
+    creases: Creases,
+    options: Options,
 ) -> RefinedPrimitive:
-    primitive = control.primitives[number]
+    primitive, split = control.primitives[number], refined.split.part(control.shares[number])
     welded = control.weld.vertex_of[control.rows[number]]
-    corners, row = distinct_corners(primitive, primitive.corners[control.kept[number]], welded)
-    if shading is not None and np.array_equal(corners, shading.groups.connectivity.faces):
+    corners, row = distinct_corners(primitive, control.rows_at_corners(number), welded)
+    if shading is not None and np.array_equal(corners, shading.groups.rows.corners):
         # Without seams inside of groups this split has been made.
-        own = shading.groups.connectivity
+        rows = shading.groups.rows
     else:
-        own = split_connectivity(corners, len(row), grid)
-    vertex = own.at_vertices(ids)
+        rows = split.rows(corners)
+    vertex = split.vertices[rows.place]
     normals, exact, morphed = None, None, (None,) * len(refined.skin_and_morph.deltas)
-    if shading is not None and number in shading.groups.ids:
-        group = own.at_vertices(shading.groups.ids[number])
+    if shading is not None and number in shading.groups.places:
+        group = shading.groups.rows.at[shading.groups.places[number]][rows.place]
         normals, morphed = shading.rounded(group), shading.under_targets(group)
         exact = shading.exact(group) if "TANGENT" in primitive.attributes else None
     # Positions of text files are doubles and stay so.
     positions = (
         np.take(refined.mesh.vertices, vertex, axis=0)
         if primitive.is_double
-        else rounded_rows(refined.mesh.vertices, vertex, blocks_of(grid))
+        else rounded_rows(refined.mesh.vertices, vertex, Blocks(available_threads()))
     )
     vertices = Vertices(
         row=row,
-        vertex=control.cleaned.vertex_map[welded[row]],
-        connectivity=own,
+        values=rows.values,
         positions=positions,
         normals=normals,
         exact_normals=exact,
         skin_and_morph=refined.skin_and_morph.take(vertex),
         morphed_normals=morphed,
     )
-    attributes = refined_attributes(primitive, vertices, uv_blend)
+    of_vertex = control.cleaned.vertex_map[welded[row]]
+
+    blend_uv = rows.values.linear
+    if options.uv == "smooth" and isinstance(split, WholeLevels):
+        blend_uv = partial(split.smooth, rows, of_vertex, creases, limit=options.limit)
+    attributes = refined_attributes(primitive, vertices, blend_uv)
     targets = [
         refined_target(primitive, vertices, attributes, target)
         for target in range(len(primitive.targets))
     ]
     for name, values in refined.scalars.items():
         attributes[name] = values[vertex, None].astype(np.float32)
-    if cut is None:
-        return RefinedPrimitive(primitive, own.refined_faces, attributes, targets, vertex)
-    still = cut.still[vertices.vertex]
-    before = primitive.attributes, *primitive.targets
+    faces = split.faces(rows.at)
+    made = RefinedPrimitive(primitive, faces, attributes, targets, vertex, split.counts)
+    if refined.still is None:
+        return made
+    before, still = (primitive.attributes, *primitive.targets), refined.still[of_vertex]
     for columns, old in zip((attributes, *targets), before, strict=True):
         keep_still(columns, old, row, still)
-    faces, counts = cut_triangles(cut.kind, own.ids, grid)
-    used = np.flatnonzero(marked(faces.reshape(-1), own.count))
+    return with_rows(made, np.flatnonzero(marked(faces.reshape(-1), len(vertex))))
+
+
+def with_rows(refined: RefinedPrimitive, used: Int[np.ndarray, " U"]) -> RefinedPrimitive:
+    """Return a refined primitive with some of its rows, ascending, which its faces name."""
     attributes, *targets = (
         {name: values[used] for name, values in columns.items()}
-        for columns in (attributes, *targets)
+        for columns in (refined.attributes, *refined.targets)
     )
-    faces = np.searchsorted(used, faces)
-    return RefinedPrimitive(primitive, faces, attributes, targets, vertex[used], counts)
+    return replace(
+        refined,
+        faces=np.searchsorted(used, refined.faces),
+        attributes=attributes,
+        targets=targets,
+        vertex=None if refined.vertex is None else refined.vertex[used],
+    )
 
 
 def refined_attributes(
-    primitive: TrianglePrimitive, vertices: Vertices, uv_blend: UvBlend
+    primitive: TrianglePrimitive,
+    vertices: Vertices,
+    blend_uv: Callable[[Shaped[np.ndarray, "C 2"]], Float[np.ndarray, "N 2"]],
 ) -> Columns:
     """Return the refined attributes in the file's order, in their component types."""
     skin: Columns = {}
     if vertices.skin_and_morph.binding is not None:
         skin = skin_attributes(primitive, vertices.skin_and_morph.binding)
-    own, refined = vertices.connectivity, Columns()
+    own, refined = vertices.values, Columns()
     for name, values in primitive.attributes.items():
         corners = values[vertices.row]
         if name == "POSITION":
@@ -266,7 +280,7 @@ def refined_attributes(
         elif name in skin:
             refined[name] = skin[name]
         elif name.startswith("TEXCOORD_"):
-            refined[name] = in_type_of(values, uv_blend(own, vertices.vertex, corners))
+            refined[name] = in_type_of(values, blend_uv(corners))
         else:
             refined[name] = blend(name, own, corners, primitive.accessors[name])
     return refined
@@ -276,7 +290,7 @@ def refined_target(
     primitive: TrianglePrimitive, vertices: Vertices, base: Columns, number: int
 ) -> Columns:
     """Return the refined deltas of a morph target; `base` are the refined attributes."""
-    own, refined, normals = vertices.connectivity, Columns(), vertices.morphed_normals[number]
+    own, refined, normals = vertices.values, Columns(), vertices.morphed_normals[number]
     for name, values in primitive.targets[number].items():
         corners = values[vertices.row]
         if name == "POSITION":
@@ -293,20 +307,8 @@ def refined_target(
     return refined
 
 
-class Blending(Protocol):
-    """A split that carries values of its rows to the refined ones."""
-
-    def linear(self, values: Shaped[np.ndarray, "C K"]) -> Float[np.ndarray, "N K"]:
-        """Return blends."""
-        ...
-
-    def nearest(self, values: Shaped[np.ndarray, "C K"]) -> Shaped[np.ndarray, "N K"]:
-        """Return values of nearest rows."""
-        ...
-
-
 def blend(
-    name: str, own: Blending, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
+    name: str, own: Values, corners: Shaped[np.ndarray, "C K"], accessor: Accessor
 ) -> Shaped[np.ndarray, "N K"]:
     """Return linear blends; of identifiers and other whole numbers, values of nearest corners."""
     fraction = accessor.normalized or name.startswith("COLOR_")

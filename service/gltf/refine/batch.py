@@ -22,14 +22,11 @@ from pns_common.report import Report
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, Bends, count_bends
-from ...meshes.barycentric_grid import barycentric_grid
-from ...meshes.uv_charts import uv_blend
+from ...changes import Change
 from ...options import Options
-from ...report import Change
 from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
-from ..read.schema import Accessor
-from .attributes import Columns, RefinedPrimitive, refined_primitives
+from .attributes import RefinedPrimitive, refined_primitives
 from .changes import (
     changes_of_primitive,
     changes_of_vertices,
@@ -37,7 +34,6 @@ from .changes import (
     near_misses,
     opposed_normals,
 )
-from .columns import COLUMNS
 from .control_mesh import ControlMesh, Parts, control_mesh, slices
 from .mesh_refine import (
     RefinedMesh,
@@ -95,56 +91,26 @@ class MeshOutcome:
         """Return the outcome of another mesh with this geometry."""
         before, after = (f"/meshes/{index}" for index in (self.index, mesh))
         moved = [
-            Change(after + change.pointer.removeprefix(before), change.what, change.count)
+            replace(change, pointer=after + change.pointer.removeprefix(before))
             for change in self.changes
         ]
         return replace(self, index=mesh, changes=moved)
 
 
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
-    """Return what meshes that may be joined have in common; None for a mesh that may not."""
-    joints = {
-        values.dtype
-        for primitive in primitives
-        for name, values in primitive.attributes.items()
-        if name.startswith("JOINTS_")
-    }
-    # The edges of a union are not followed.
-    if any(primitive.outline is not None for primitive in primitives):
-        return None
-    # Joints of a wide primitive may reach into a narrow one and widen it, in its mesh alone.
-    if len(joints) > 1:
-        return None
-    return (
-        _joint_blocks(primitives),
-        *(
-            (
-                _signature(primitive.attributes, primitive.accessors),
-                *map(_signature, primitive.targets, primitive.target_accessors),
-            )
-            for primitive in primitives
-        ),
-    )
+    """Return what meshes that may be joined have in common; None for a mesh that may not.
 
-
-def _signature(attributes: Columns, accessors: dict[str, Accessor]) -> Hashable:
-    return tuple(
-        (name, values.dtype.str, values.shape[1], accessors[name].normalized)
-        for name, values in attributes.items()
-    )
-
-
-def _joint_blocks(primitives: Sequence[TrianglePrimitive]) -> int:
-    """Return the number of blocks of joints of a mesh to a factor of two; 0 without a skin.
-
-    Meshes with few joints then do not wait for one with many.
+    Poses and the edges of a union are not followed.
     """
-    named = [
-        primitive.attributes[f"JOINTS_{number}"].reshape(-1)
+    if any(p.targets or skin_sets(p) or p.outline is not None for p in primitives):
+        return None
+    return tuple(
+        tuple(
+            (name, values.dtype.str, values.shape[1], primitive.accessors[name].normalized)
+            for name, values in primitive.attributes.items()
+        )
         for primitive in primitives
-        for number in skin_sets(primitive)
-    ]
-    return (-(-len(np.unique(np.concatenate(named))) // COLUMNS)).bit_length() if named else 0
+    )
 
 
 def refine_batch(
@@ -173,7 +139,7 @@ def refine_batch(
             control, parts = _smoothed(control, parts, creases, options)
     with stages.stage("refine", shares.refine, shares.attributes):
         try:
-            made = refined_union(control, parts, creases, scheme, options, stages)
+            made = refined_union(control, parts, creases, scheme, options)
         except MeshError:
             # The error does not say which mesh it is: try halves, down to one mesh.
             if len(meshes) == 1:
@@ -185,8 +151,7 @@ def refine_batch(
             )
             return [one or other for one, other in zip(first, second, strict=True)]
     with stages.stage("attributes", shares.attributes, shares.write):
-        grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-        pieces = refined_primitives(control, made, grid, blend, stages)
+        pieces = refined_primitives(control, made, creases, options, stages)
         part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
         bends = count_bends(control.mesh, creases, options, len(meshes), part_of_face)
         cut = _divided(control, parts, made, pieces, meshes, numbers, options)
@@ -260,18 +225,12 @@ def _joined_primitive(place: int, primitives: Sequence[TrianglePrimitive]) -> Tr
         number=place,
         rows=np.arange(sum(counts)),
         corners=disjoint_faces(zip(faces, counts, strict=True)),
-        attributes=_concatenated([primitive.attributes for primitive in primitives]),
+        attributes={
+            name: np.concatenate([primitive.attributes[name] for primitive in primitives])
+            for name in first.attributes
+        },
         accessors=first.accessors,
-        targets=tuple(
-            _concatenated(alike)
-            for alike in zip(*(primitive.targets for primitive in primitives), strict=True)
-        ),
-        target_accessors=first.target_accessors,
     )
-
-
-def _concatenated(columns: Sequence[Columns]) -> Columns:
-    return {name: np.concatenate([values[name] for values in columns]) for name in columns[0]}
 
 
 def _divided(
@@ -313,9 +272,7 @@ def _divided(
             for primitive, keep in zip(primitives, own, strict=True)
             for change in changes_of_primitive(primitive, keep, options.levels, pointer)
         ]
-        changes += changes_of_vertices(
-            near[part], int(made.cut[part]), float(made.lost[part]), pointer
-        )
+        changes += changes_of_vertices(near[part], 0, 0.0, pointer)
         changes += near_miss_changes(misses[part], pointer)
         changes += opposed_normals(refined[part], pointer)
         outcomes.append(
@@ -344,25 +301,19 @@ def _divided_primitive(
     place = np.empty_like(order)
     place[order] = np.arange(len(order)) - starts[part_of[order]]
     faces = place[refined.faces]
-    attributes, *targets = (
-        {name: values[order] for name, values in columns.items()}
-        for columns in (refined.attributes, *refined.targets)
-    )
+    attributes = {name: values[order] for name, values in refined.attributes.items()}
     ends = np.cumsum([0, *counts])
     return [
         RefinedPrimitive(
             source=source,
             faces=faces[ends[part] : ends[part + 1]],
-            attributes=_rows(attributes, own),
-            targets=[_rows(target, own) for target in targets],
+            attributes={
+                name: values[starts[part] : starts[part + 1]] for name, values in attributes.items()
+            },
+            targets=[],
         )
         for part, source in enumerate(sources)
-        for own in [slice(starts[part], starts[part + 1])]
     ]
-
-
-def _rows(columns: Columns, rows: slice) -> Columns:
-    return {name: values[rows] for name, values in columns.items()}
 
 
 def _shares(

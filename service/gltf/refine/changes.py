@@ -13,8 +13,8 @@ from pns_common.mesh.rows import dot, extent
 from pns_common.mesh.topology import Topology
 from pns_common.parallel import Blocks, available_threads
 
+from ...changes import Change, counted
 from ...meshes.weld import near_labels
-from ...report import Change
 from ..read.primitives import TrianglePrimitive
 from .attributes import RefinedPrimitive
 from .normals import border_vertices
@@ -55,8 +55,7 @@ def near_misses(
 
 def near_miss_changes(count: int, pointer: str) -> list[Change]:
     """Return the report's entry on border vertices that nearly meet, in the mesh at `pointer`."""
-    what = "border vertices lie within 1e-5 R of another"
-    return [Change(pointer, what, count)] if count else []
+    return counted({"near-misses": count}, pointer)
 
 
 def changes_of_primitive(
@@ -65,17 +64,13 @@ def changes_of_primitive(
     """Return the dropped faces of a primitive of the mesh at `pointer`, and those too far away."""
     pointer = f"{pointer}/primitives/{primitive.number}"
     if not kept.any():
-        return [Change(pointer, "left as it was: no face has an area", len(kept))]
+        return [Change(pointer, "left-as-it-was", len(kept))]
     dropped = int((~kept).sum())
     faces = primitive.corners if dropped == 0 else primitive.corners[kept]
     far = 0
     if not primitive.is_double:
         far = faces_too_far(primitive.attributes["POSITION"], faces, levels)
-    counts = {
-        "degenerate faces dropped": dropped,
-        f"faces too far from the origin: a side has fewer than {STEPS} steps of float32": far,
-    }
-    return [Change(pointer, what, count) for what, count in counts.items() if count]
+    return counted({"degenerate-faces": dropped, ("too-far", str(STEPS)): far}, pointer)
 
 
 def changes_of_vertices(near: int, cut: int, lost: float, pointer: str) -> list[Change]:
@@ -83,12 +78,9 @@ def changes_of_vertices(near: int, cut: int, lost: float, pointer: str) -> list[
 
     `lost` is the largest share of a vertex's weight that its lost joints had.
     """
-    counts = {
-        "vertices joined within weld_tolerance": near,
-        f"refined vertices that lost their lightest joints, at most {ceil(100 * lost)} % of the "
-        "weight": cut,
-    }
-    return [Change(pointer, what, count) for what, count in counts.items() if count]
+    percent = ceil(100 * lost)
+    light = "light-joints-cut" if percent == 1 else ("joints-cut", str(percent))
+    return counted({"joined": near, light: cut}, pointer)
 
 
 def opposed_normals(refined: Sequence[RefinedPrimitive], pointer: str) -> list[Change]:
@@ -103,9 +95,8 @@ def opposed_normals(refined: Sequence[RefinedPrimitive], pointer: str) -> list[C
         for part in refined
         if "NORMAL" in part.attributes
     }
-    what = "corners with a normal that points away from their face's front"
     return [
-        Change(f"{pointer}/primitives/{number}", what, count)
+        Change(f"{pointer}/primitives/{number}", "opposed-normals", count)
         for number, count in counts.items()
         if count
     ]

@@ -10,16 +10,13 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from pns_common.carry.grid import index_type, take_points
 from pns_common.mesh.mesh import Cleaned, Mesh, clean, repeated_vertex
 from pns_common.mesh.rows import distinct_rows, dot, norm, unit
 
-from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import blocks_of
 from ...meshes.weld import WHOLE, Weld, weld, weld_by_label, weld_within
 from ...options import Options
 from ..read.primitives import TrianglePrimitive
-from .polygons import Found, Polygons, polygons_of
+from .polygons import Found, KeptFaces, polygons_of, triangles_of
 from .skin import SkinAndMorph, read_skin_and_morph
 
 # Exporters compute the two sides of a UV seam apart and round differently, in real files by up to
@@ -75,7 +72,6 @@ class ControlMesh:
         near: (P,) for each part, the number of unequal vertices that were joined.
         authored: whether the normals are the file's.
         polygons: what its triangles are refined as; None: as triangles.
-        own: (N,) the share of each row's normal that is its author's own; None: not found yet.
     """
 
     primitives: Sequence[TrianglePrimitive]
@@ -86,8 +82,7 @@ class ControlMesh:
     skin_and_morph: SkinAndMorph
     near: Int[np.ndarray, " P"]
     authored: bool = True
-    polygons: Polygons | None = None
-    own: Float[np.ndarray, " N"] | None = None
+    polygons: KeptFaces | None = None
 
     @property
     def is_empty(self) -> bool:
@@ -109,14 +104,12 @@ class ControlMesh:
     @property
     def surface(self) -> Mesh:
         """The mesh to refine, of polygons where its triangles are joined."""
-        return self.mesh if self.polygons is None else self.polygons.mesh
+        return self.mesh if self.polygons is None else self.polygons.surface
 
-    @property
-    def face_of_kept(self) -> Int[np.ndarray, " P"]:
-        """The face of the mesh to refine that each kept triangle, or what it copies, is part of."""
-        if self.polygons is not None:
-            return self.polygons.of_kept
-        return self.cleaned.representative[np.concatenate(self.kept)]
+    @cached_property
+    def faces(self) -> KeptFaces:
+        """The kept triangles, or the polygons that they form."""
+        return self.polygons or triangles_of(self.weld.faces, self.cleaned)
 
     @property
     def copies(self) -> int:
@@ -127,6 +120,20 @@ class ControlMesh:
     def kept_counts(self) -> list[int]:
         """Number of kept faces of each primitive."""
         return [int(keep.sum()) for keep in self.kept]
+
+    @property
+    def shares(self) -> list[slice]:
+        """The kept faces of each primitive."""
+        first = self.faces.corners[self.faces.offsets[:-1]] // 3
+        ends = np.searchsorted(first, np.cumsum([0, *self.kept_counts])).tolist()
+        return [slice(start, end) for start, end in pairwise(ends)]
+
+    def rows_at_corners(self, number: int) -> Int[np.ndarray, " H"]:
+        """Return a primitive's row at each corner of its kept faces."""
+        faces, share, triangles = self.faces, self.shares[number], self.kept_counts[:number]
+        begin, end = faces.offsets[[share.start, share.stop]]
+        kept = self.primitives[number].corners[self.kept[number]].reshape(-1)
+        return kept[faces.corners[begin:end] - 3 * sum(triangles)]
 
     @cached_property
     def normal_labels(self) -> Int[np.ndarray, " N"]:
@@ -282,27 +289,3 @@ def _vertex_counts(
         return np.zeros(len(starts), dtype=np.int64)
     a, b, c = faces.T
     return np.diff(np.maximum.reduceat(np.maximum(np.maximum(a, b), c), starts), prepend=-1)
-
-
-def refined_ids(
-    welded: Weld, cleaned: Cleaned, refined: Mesh, grid: BarycentricGrid
-) -> Int[np.ndarray, "P T"]:
-    """Return the refined vertex at each grid point of each kept face.
-
-    A copy of a face (double-sided modelling, decals) has the vertices of the refined face, in its
-    own order of corners.
-    """
-    proper = cleaned.representative >= 0
-    leader = cleaned.representative[proper]
-    corners = refined.faces.reshape(len(cleaned.mesh.faces), -1)
-    ids = take_points(corners, grid.slot, index_type(len(refined.vertices)), blocks_of(grid))
-    if not np.array_equal(leader, np.arange(len(leader))):
-        ids = np.take(ids, leader, axis=0)
-    copies = np.flatnonzero(cleaned.face_map[proper] < 0)
-    if len(copies):
-        own = cleaned.vertex_map[welded.faces[proper][copies]]
-        same = own[:, :, None] == cleaned.mesh.faces[leader[copies]][:, None, :]
-        place = same.argmax(axis=2)
-        reorder = grid.reorder[3 * place[:, 0] + place[:, 1]]
-        ids[copies] = np.take_along_axis(ids[copies], reorder, axis=1)
-    return ids

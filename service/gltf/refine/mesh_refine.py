@@ -4,31 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from pns_common.carry.columns import level_topologies
+from pns_common.carry.columns import ColumnRefinement
 from pns_common.errors import MeshError
-from pns_common.mesh.creases import NO_CREASES, Creases, edge_cosines
+from pns_common.mesh.creases import NO_CREASES, Creases
 from pns_common.mesh.mesh import Mesh
 from pns_common.mesh.rows import disjoint_faces, extent
-from pns_common.mesh.topology import Topology, split_faces
+from pns_common.mesh.topology import Topology
 from pns_common.operator.scheme import Scheme
 from pns_common.operator.sharpness import creases_by_name
 from pns_common.parallel import Blocks, available_threads
 from pns_common.refined import Refinement
 from pns_common.refinement import refine, refine_many
 from pns_common.report import Report
+from pns_common.schemes import LOOP
 from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...errors import UnrefinableError
+from ...meshes.creases import chosen_creases
 from ...options import Options
 from ...stages import Stages
 from .columns import refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
 from .skin import SkinAndMorph
+from .split import Split, whole_levels
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
@@ -41,25 +45,26 @@ class RefinedMesh:
         mesh: the refined mesh.
         reports: of the operator, one for each part.
         skin_and_morph: skin binding and morph deltas.
-        cut: (P,) number of vertices of each part that lost a joint for lack of slots.
-        lost: (P,) the largest share of a vertex's weight that these had.
         scalars: further attributes by name.
         limit_normals: of the limit surface, if the vertices are on it.
+        split: what the kept faces were split into.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
-        levels: the topologies that were refined, control mesh first; none for a union.
+        levels: the topologies that were refined, control mesh first; none for a union, and where
+            faces have several levels.
+        still: (V,) vertices of the control mesh that no chosen face has; None: all are chosen.
     """
 
     mesh: Mesh
     reports: list[Report]
     skin_and_morph: SkinAndMorph
-    cut: Int[np.ndarray, " P"]
-    lost: Float[np.ndarray, " P"]
     scalars: dict[str, Float[np.ndarray, " V"]]
     limit_normals: Float[np.ndarray, "V 3"] | None
+    split: Split
     parents: SubdivisionMatrix | None = None
     topology: Topology | None = None
     levels: Sequence[Topology] = ()
+    still: Bool[np.ndarray, " C"] | None = None
 
 
 def creases_of(
@@ -72,16 +77,19 @@ def creases_of(
     """
     if control.is_empty:
         return NO_CREASES
-    if options.crease == "normals":
-        return Creases(_on_surface(control, hard_edges(control)), border=options.border)
-    if parts is None or options.crease != "auto" or not scheme.creases.learned:
-        by_shape = creases_by_shape(control.surface, options, scheme)
-    else:
-        by_shape = _creases_of_parts(control, parts, scheme)
-    by_shape = replace(by_shape, border=options.border)
+    of_parts = None
+    if parts is not None and scheme.creases.learned:
+        of_parts = partial(_creases_of_parts, control, parts, scheme)
+    creases = chosen_creases(
+        control.surface,
+        options,
+        scheme,
+        lambda: _on_surface(control, hard_edges(control)),
+        of_parts,
+    )
     if options.crease != "auto" or not scheme.creases.finds:
-        return by_shape
-    return by_shape.with_named(_on_surface(control, marked_edges(control)))
+        return creases
+    return creases.with_named(_on_surface(control, marked_edges(control)))
 
 
 def _on_surface(control: ControlMesh, pairs: Int[np.ndarray, "N 2"]) -> Int[np.ndarray, "N 2"]:
@@ -150,13 +158,16 @@ def refined_mesh(
             check_range(made.mesh)
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
-    faces, levels, base = made.mesh.faces, made.topologies, made.scheme.base
+    levels, base = made.topologies, made.scheme.base
+    split = whole_levels(control.faces, made.mesh.corners, options.levels, base, levels)
+    linear = ColumnRefinement(levels, base, options.limit, Blocks(available_threads()))
     return RefinedMesh(
         made.mesh,
         [made.report],
-        *refined_skin_and_morph(control, faces, levels, options, stages, base=base),
+        refined_skin_and_morph(control, split, linear, stages),
         _scalars(made, options),
         made.normals,
+        split,
         made.parents if traced else None,
         levels[0],
         levels,
@@ -169,9 +180,8 @@ def refined_union(
     creases: Creases,
     scheme: Scheme,
     options: Options,
-    stages: Stages,
 ) -> RefinedMesh:
-    """Refine the parts of a union, each to the bits that it has alone.
+    """Refine the parts of a union, which have no skin or morph, each to the bits of it alone.
 
     Raises:
         MeshError: a part cannot be refined, or its positions leave the range of float32.
@@ -192,33 +202,11 @@ def refined_union(
     return RefinedMesh(
         Mesh.of_refined(np.concatenate([each.mesh.vertices for each in made]), faces),
         [each.report for each in made],
-        *_skin_and_morph_of_union(control, parts, faces, creases, options, stages),
+        control.skin_and_morph,
         {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
         np.concatenate(normals) if normals else None,
+        whole_levels(control.faces, faces.reshape(-1), options.levels, LOOP, ()),
     )
-
-
-def _skin_and_morph_of_union(
-    control: ControlMesh,
-    parts: Parts,
-    faces: Int[np.ndarray, "G 3"],
-    creases: Creases,
-    options: Options,
-    stages: Stages,
-) -> tuple[SkinAndMorph, Int[np.ndarray, " P"], Float[np.ndarray, " P"]]:
-    """Refine skin and morph of a union whose refined faces are given."""
-    if not control.skin_and_morph.any:
-        return control.skin_and_morph, np.zeros(parts.count, dtype=np.int64), np.zeros(parts.count)
-    blocks, mesh = Blocks(available_threads()), control.mesh
-    levels = level_topologies(
-        mesh.faces, len(mesh.vertices), options.levels, creases, blocks=blocks
-    )
-    own = split_faces(levels[-1], blocks, np.int64)
-    refined, cut, lost = refined_skin_and_morph(control, own, levels, options, stages, parts)
-    # Refining the union orders its faces like refining the parts, but numbers vertices otherwise.
-    vertex = np.empty(int(faces.max()) + 1, dtype=np.int64)
-    vertex[faces] = own
-    return refined.take(vertex), cut, lost
 
 
 def _jobs(
@@ -272,17 +260,3 @@ def _scalars(made: Refinement, options: Options) -> dict[str, Float[np.ndarray, 
             finer.append(values[topology.corners.reshape(-1, 4)].mean(axis=1))
         values = np.concatenate(finer)
     return {RATIO: values[:, 0], GATE: values[:, 1]}
-
-
-def creases_by_shape(mesh: Mesh, options: Options, scheme: Scheme) -> Creases:
-    """Return the edges of a mesh that the options keep sharp by its shape, by name.
-
-    With `crease=auto` these are the scheme's: none for Loop and models of format 1.
-    """
-    if options.crease == "auto" and scheme.creases.finds:
-        return creases_by_name(mesh, scheme.creases, scheme)
-    if options.crease_angle is None:
-        return NO_CREASES
-    topology = mesh.topology()
-    rows = np.flatnonzero(edge_cosines(mesh.vertices, topology) < np.cos(options.crease_angle))
-    return Creases(topology.edges[rows].astype(np.int64))

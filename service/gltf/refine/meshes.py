@@ -16,8 +16,6 @@ from pns_common.schemes.matrix import SubdivisionMatrix
 
 from ...advice import NO_BENDS, count_bends
 from ...errors import InvalidParameter
-from ...meshes.barycentric_grid import barycentric_grid
-from ...meshes.uv_charts import uv_blend
 from ...options import Limits, Options
 from ...stages import Stages
 from ..read.plan import MeshPlan
@@ -34,7 +32,6 @@ from .changes import (
     opposed_normals,
 )
 from .control_mesh import ControlMesh, control_mesh
-from .level_one import refined_polygons
 from .mesh_refine import (
     creases_of,
     refined_mesh,
@@ -43,7 +40,7 @@ from .mesh_refine import (
 from .new_normals import with_normal_rule, with_smooth_normals
 from .outlines import refined_outlines, with_outline
 from .polygons import Found, find_polygons
-from .selection import Chosen, chosen_primitives, cut_faces
+from .selection import Chosen, chosen_primitives, keep_chosen
 
 # Above so many refined faces a mesh is refined alone: its own work outweighs the fixed cost.
 MOST_FACES = 2**15
@@ -53,6 +50,8 @@ GROUP_FACES = 2**17
 # Costs of stages for each refined face, where refining by Loop with its report costs 1. Measured
 # on a part of 2,000 faces with normals and texture coordinates at four and five levels.
 READ, WELD, LIMIT, ATTRIBUTES = 0.05, 0.05, 2.0, 1.7
+# The same with a goal, by Loop; what is learned adds to the first.
+GOAL, GOAL_ATTRIBUTES = 12.0, 8.0
 WRITE = {"none": 0.1, "meshopt": 2.5, "draco": 25.0}
 
 
@@ -105,10 +104,16 @@ def mostly_polygons(upload: Upload) -> bool:
 
 def stage_shares(scheme: Scheme, options: Options) -> StageShares:
     """Return where the stages of a mesh begin, by their measured costs."""
+    if options.goals:
+        return _shares(GOAL, GOAL_ATTRIBUTES, options)
     made = [4**level for level in range(1, options.levels + 1)]
     learned = made if scheme.learned_levels is None else made[: scheme.learned_levels]
     refine = 1 + LEARNED_COST * sum(learned) / sum(made) + LIMIT * options.limit
-    costs = [READ, WELD, refine, ATTRIBUTES, WRITE[options.compress]]
+    return _shares(refine, ATTRIBUTES, options)
+
+
+def _shares(refine: float, attributes: float, options: Options) -> StageShares:
+    costs = [READ, WELD, refine, attributes, WRITE[options.compress]]
     return StageShares(*(end / sum(costs) for end in list(accumulate(costs))[:-1]))
 
 
@@ -245,34 +250,23 @@ def refine_alone(
     with stages.stage("refine", shares.refine, shares.attributes):
         if not control.is_empty and options.goals:
             asked = control, creases, scheme, options, limits or Limits(), pointer, stages
-            made, refined = refine_to_goal(*asked, traced=traced)
+            made = refine_to_goal(*asked, traced=traced)
         elif not control.is_empty:
             made = refined_mesh(control, creases, scheme, options, pointer, stages, traced=traced)
+            if chosen is not None:
+                made = keep_chosen(made, control, chosen)
     with stages.stage("attributes", shares.attributes, shares.write):
-        if made is not None and not options.goals:
-            grid, blend = barycentric_grid(options.levels), uv_blend(options, creases)
-            cut = None if chosen is None else cut_faces(control, chosen)
-            if control.polygons is not None:
-                refined = refined_polygons(
-                    control, control.polygons, made, creases, options, stages
-                )
-            else:
-                refined = refined_primitives(control, made, grid, blend, stages, cut)
-            for number, edges in refined_outlines(control, made.levels).items():
-                source = control.primitives[number].number
-                refined = [
-                    with_outline(each, edges) if each.source.number == source else each
-                    for each in refined
-                ]
-            if cut is not None and made.parents is not None:
-                made = replace(made, parents=made.parents.unmoved(cut.still))
+        if made is not None:
+            refined = refined_primitives(control, made, creases, options, stages)
+            outlines = refined_outlines(control, made.levels)
+            refined = [with_outline(each, outlines) for each in refined]
     changes = [
         change
         for primitive, keep in zip(control.primitives, control.kept, strict=True)
         for change in changes_of_primitive(primitive, keep, options.levels, pointer)
     ]
     (near,) = control.near.tolist()
-    (cut,), (lost,) = ([0], [0.0]) if made is None else (made.cut.tolist(), made.lost.tolist())
+    cut, lost = (0, 0.0) if made is None else made.skin_and_morph.losses
     changes += changes_of_vertices(near, cut, lost, pointer)
     if made is not None and made.topology is not None:
         length = made.reports[0]["reference_length"]

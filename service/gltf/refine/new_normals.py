@@ -10,15 +10,16 @@ from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh.creases import edge_cosines
 from pns_common.mesh.normals import smooth_fans
-from pns_common.mesh.rows import marked
 from pns_common.mesh.topology import build_topology
 
+from ...meshes.creases import hard_edges as hard_between
 from ...options import Options
 from ..constants import FLOAT
 from ..read.primitives import TrianglePrimitive
 from ..read.schema import Accessor
 from .control_mesh import NO_NORMAL, ControlMesh
 from .normals import corner_normals, safe_unit
+from .polygons import triangles_of
 
 # An edge whose faces' normals have a cosine this far below 1 is bent: a twelfth of a degree.
 BENT = 1e-6
@@ -29,26 +30,12 @@ MOST = 0.5
 
 
 def hard_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
-    """Return the interior edges whose two faces carry different normals at both ends.
+    """Return the edges that normals make hard, as pairs of vertices of the mesh to refine.
 
-    Pairs of vertices of the mesh to refine, the lower first. Both ends count: the sides of a cone
-    share normals along its base and differ at its tip alone, and the cone is smooth. A corner
-    without a normal, or with one of length 0, makes no edge hard.
+    A corner without a normal, or with one of length 0, makes no edge hard.
     """
-    faces = control.mesh.faces
-    label, vertex = control.of_cleaned(_labels_of_faces(control)).reshape(-1), faces.reshape(-1)
-    of_vertex = np.empty(len(control.mesh.vertices), dtype=label.dtype)
-    of_vertex[vertex] = label
-    several = marked(vertex[of_vertex[vertex] != label], len(of_vertex))
-    topology = build_topology(faces, len(of_vertex))
-    edges, half_edges = topology.edges[topology.interior], topology.half_edges[topology.interior]
-    asked = np.flatnonzero(several[edges].all(axis=1))
-    hard = np.ones(len(asked), dtype=bool)
-    there, back = half_edges[asked].T
-    for corners, facing in ((there, _next_corner(back)), (_next_corner(there), back)):
-        first, second = label[corners], label[facing]
-        hard &= (first != NO_NORMAL) & (second != NO_NORMAL) & (first != second)
-    return edges[asked[hard]].astype(np.int64)
+    label = control.of_cleaned(_labels_of_faces(control)).reshape(-1)
+    return hard_between(build_topology(control.mesh.faces, len(control.mesh.vertices)), label)
 
 
 def marked_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
@@ -66,11 +53,6 @@ def marked_edges(control: ControlMesh) -> Int[np.ndarray, "N 2"]:
     beside_smooth = np.zeros(len(mesh.vertices), dtype=bool)
     beside_smooth[topology.edges[bent]] = True
     return hard[beside_smooth[hard].any(axis=1)]
-
-
-def _next_corner(corners: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Return the corner after each corner 3 f + i of its triangle."""
-    return np.where(corners % 3 < 2, corners + 1, corners - 2)
 
 
 def _labels_of_faces(control: ControlMesh) -> Int[np.ndarray, "P 3"]:
@@ -116,7 +98,8 @@ def with_smooth_normals(
     fans = smooth_fans(control.mesh.faces, len(control.mesh.vertices), creases)
     count = int(fans.max()) + 1
     values = safe_unit(corner_normals(control.mesh.vertices, control.mesh.faces, fans, count))
-    fan, turned = _of_kept_faces(control, fans)
+    kept = triangles_of(control.weld.faces, control.cleaned)
+    fan, turned = fans.reshape(-1)[kept.source].reshape(-1, 3), kept.turned
     primitives: list[TrianglePrimitive] = []
     start = 0
     for primitive, keep in zip(control.primitives, control.kept, strict=True):
@@ -130,20 +113,6 @@ def with_normal_accessor(accessors: dict[str, Accessor], count: int) -> dict[str
     """Return the accessors of a primitive with normals; a new one if it had none."""
     plain = Accessor(component_type=FLOAT, count=count, type="VEC3")
     return {"NORMAL": plain} | accessors
-
-
-def _of_kept_faces(
-    control: ControlMesh, fans: Int[np.ndarray, "F 3"]
-) -> tuple[Int[np.ndarray, "P 3"], Bool[np.ndarray, " P"]]:
-    """Return the fans of the corners of all kept faces, and which faces are reversed copies."""
-    cleaned, proper = control.cleaned, np.concatenate(control.kept)
-    leader = cleaned.representative[proper]
-    if np.array_equal(leader, np.arange(len(fans))):
-        return fans, np.zeros(len(fans), dtype=bool)
-    own = cleaned.vertex_map[control.weld.faces[proper]]
-    place = (own[:, :, None] == cleaned.mesh.faces[leader][:, None, :]).argmax(axis=2)
-    turned = (place[:, 1] - place[:, 0]) % 3 != 1
-    return np.take_along_axis(fans[leader], place, axis=1), turned
 
 
 def _with_normals(

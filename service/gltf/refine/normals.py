@@ -15,17 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pns_common.carry.grid import rounded_rows
+from pns_common.carry.rows import rounded_rows
 from pns_common.mesh.normals import ONE_TRIANGLE, angle_weighted_normals
 from pns_common.mesh.rows import cross, dot, marked, norm, number_by_first_appearance, unit
 from pns_common.mesh.topology import EdgeClass, Topology
 from pns_common.parallel import Blocks, available_threads, no_progress
 
-from ...meshes.barycentric_grid import BarycentricGrid
-from ...meshes.split_connectivity import SplitConnectivity, blocks_of, split_connectivity
 from ...stages import Stages
 from .control_mesh import ControlMesh, slices
 from .skin import SkinAndMorph
+from .split import Rows, Split
 
 # Share of the progress that finding groups takes.
 GROUPING = 0.25
@@ -69,25 +68,25 @@ Given = Callable[[int | None], Float[np.ndarray, "C 3"]]
 
 @dataclass(frozen=True, eq=False)
 class NormalGroups:
-    """The G groups of refined corners that share a normal.
+    """The groups of refined corners that share a normal.
 
     Attributes:
-        vertices: (F, T) refined vertices at the grid points of the faces with normals.
-        connectivity: of the C groups before refinement, split; its refined vertices are the groups.
-        ids: for each primitive, the groups at the grid points of its faces.
+        split: what the faces with normals were split into.
+        rows: the groups that the C groups before refinement become.
+        places: for each primitive, its corners of the split.
         given: returns the normals (C, 3) of the file, at rest (None) or under a morph target.
         own: share of these that is their author's own; None if nothing is.
     """
 
-    vertices: Int[np.ndarray, "F T"]
-    connectivity: SplitConnectivity
-    ids: dict[int, Int[np.ndarray, "F T"]]
+    split: Split
+    rows: Rows
+    places: dict[int, slice]
     given: Given
     own: Float[np.ndarray, " C"] | None
 
     def before(self) -> Float[np.ndarray, "G 3"]:
         """Return the file's normals, interpolated linearly: for faces without area."""
-        return safe_unit(self.connectivity.linear(self.given(None)))
+        return safe_unit(self.rows.values.linear(self.given(None)))
 
     def normals(
         self,
@@ -96,14 +95,9 @@ class NormalGroups:
         stages: Stages,
     ) -> Float[np.ndarray, "G 3"]:
         """Return unit normals of the groups; those of `otherwise` where faces have no area."""
-        values = corner_normals(
-            points,
-            self.vertices,
-            self.connectivity.ids,
-            self.connectivity.count,
-            self.connectivity.grid.faces,
-            stages.count(len(self.vertices)),
-        )
+        faces, groups = (self.split.wholes(at) for at in (self.split.vertices, self.rows.at))
+        triangles, told = np.arange(faces.shape[1]).reshape(-1, 3), stages.count(len(faces))
+        values = corner_normals(points, faces, groups, len(self.rows.place), triangles, told)
         # A first look at one column is cheap.
         undefined = np.flatnonzero(values[:, 0] == 0)
         undefined = undefined[~values[undefined].any(axis=1)]
@@ -117,9 +111,9 @@ class NormalGroups:
         """Blend the author's own normals into others, at rest (None) or under a morph target."""
         if self.own is None:
             return values
-        share = self.connectivity.linear(self.own[:, None])
+        share = self.rows.values.linear(self.own[:, None])
         rows = np.flatnonzero(share)
-        own = self.connectivity.linear(unit(self.given(target)))[rows]
+        own = self.rows.values.linear(unit(self.given(target)))[rows]
         values[rows] = safe_unit((1 - share[rows]) * values[rows] + share[rows] * own)
         return values
 
@@ -130,7 +124,7 @@ class NormalGroups:
 
         On a crease the limit surface has a normal for each side.
         """
-        vertex = self.connectivity.at_vertices(self.vertices)
+        vertex = self.split.vertices[self.rows.place]
         exact = limit[vertex]
         alone = (np.bincount(vertex, minlength=len(limit))[vertex] == 1) & exact.any(axis=1)
         # A reversed copy of a face shows the other side.
@@ -138,82 +132,19 @@ class NormalGroups:
         return np.where(alone[:, None], side * exact, values)
 
 
-def normal_groups(
-    control: ControlMesh, ids: Sequence[Int[np.ndarray, "F T"]], grid: BarycentricGrid
-) -> NormalGroups | None:
-    """Return the groups of the primitives with normals; None if none has.
-
-    `ids` are the refined vertices at the grid points of the faces of each primitive.
-    """
+def normal_groups(control: ControlMesh, split: Split) -> NormalGroups | None:
+    """Return the groups of the primitives with normals; None if none has."""
+    shares = control.shares
     chosen = [
         number
         for number, primitive in enumerate(control.primitives)
-        if "NORMAL" in primitive.attributes and len(ids[number])
+        if "NORMAL" in primitive.attributes and shares[number].stop > shares[number].start
     ]
     if not chosen:
         return None
-    corners, given, flat = _corners(control, chosen)
-    groups = split_connectivity(corners, int(corners.max()) + 1, grid)
-    shares = slices([len(ids[number]) for number in chosen])
-    return NormalGroups(
-        vertices=np.concatenate([ids[number] for number in chosen]),
-        connectivity=groups,
-        ids={number: groups.ids[part] for number, part in zip(chosen, shares, strict=True)},
-        given=given,
-        own=_shares(control, chosen, corners, given, flat),
-    )
-
-
-def _shares(
-    control: ControlMesh,
-    chosen: Sequence[int],
-    corners: Int[np.ndarray, "F 3"],
-    given: Given,
-    flat: Int[np.ndarray, " H"],
-) -> Float[np.ndarray, " C"] | None:
-    """Return the share of each group's normal that is its author's own; None if nothing is."""
-    if control.own is None:
-        return _own(control, chosen, corners, given(None)) if control.authored else None
-    shares = np.empty(int(corners.max()) + 1)
-    shares[corners.reshape(-1)] = control.own[_rows_of(control, chosen)[flat]]
-    return shares
-
-
-def own_of_rows(control: ControlMesh) -> Float[np.ndarray, " N"] | None:
-    """Return the share of each row's normal that is its author's own; None if nothing is."""
-    chosen = [
-        number
-        for number, primitive in enumerate(control.primitives)
-        if "NORMAL" in primitive.attributes and control.kept[number].any()
-    ]
-    if not chosen:
-        return None
-    corners, given, flat = _corners(control, chosen)
-    shares = _shares(control, chosen, corners, given, flat)
-    if shares is None:
-        return None
-    made = np.zeros(control.rows[-1].stop)
-    made[_rows_of(control, chosen)[flat]] = shares[corners.reshape(-1)]
-    return made
-
-
-def _rows_of(control: ControlMesh, chosen: Sequence[int]) -> Int[np.ndarray, " N"]:
-    return np.concatenate([np.arange(control.rows[n].start, control.rows[n].stop) for n in chosen])
-
-
-def _corners(
-    control: ControlMesh, chosen: Sequence[int]
-) -> tuple[Int[np.ndarray, "F 3"], Given, Int[np.ndarray, " H"]]:
-    """Return the faces over pairs of welded vertex and normal, `NormalGroups.given`, and rows.
-
-    The rows of the corners are numbered over those of the chosen primitives.
-    """
     starts = slices([len(control.primitives[number].attributes["NORMAL"]) for number in chosen])
-    rows = [
-        control.primitives[number].corners[control.kept[number]] + part.start
-        for number, part in zip(chosen, starts, strict=True)
-    ]
-    flat = np.concatenate(rows).reshape(-1)
+    rows = [control.rows_at_corners(n) + s.start for n, s in zip(chosen, starts, strict=True)]
+    flat = np.concatenate(rows)
     labels = np.concatenate([control.normal_labels[control.rows[number]] for number in chosen])
     corners, first = number_by_first_appearance(labels[flat])
 
@@ -222,7 +153,16 @@ def _corners(
         values[corners] = _normals_under(control, chosen, target)[flat]
         return values
 
-    return corners.reshape(-1, 3), given, flat
+    own = _own(control, chosen, labels)
+    part = split.part(*(shares[number] for number in chosen))
+    places = slices([len(split.part(shares[number]).vertices) for number in chosen])
+    return NormalGroups(
+        split=part,
+        rows=part.rows(corners),
+        places=dict(zip(chosen, places, strict=True)),
+        given=given,
+        own=None if own is None else own[flat[first]],
+    )
 
 
 def _normals_under(
@@ -241,24 +181,34 @@ def _normals_under(
 
 
 def _own(
-    control: ControlMesh,
-    chosen: Sequence[int],
-    corners: Int[np.ndarray, "F 3"],
-    given: Float[np.ndarray, "C 3"],
-) -> Float[np.ndarray, " C"] | None:
-    """Return the share of each given normal that is its author's own; None if nothing is."""
+    control: ControlMesh, chosen: Sequence[int], labels: Int[np.ndarray, " N"]
+) -> Float[np.ndarray, " N"] | None:
+    """Return the share of each row's normal that is its author's own; None if nothing is."""
+    if not control.authored:
+        return None
     ends, points = slices([len(keep) for keep in control.kept]), control.weld.points
     faces = np.concatenate([control.weld.faces[ends[n]][control.kept[n]] for n in chosen])
+    starts = slices([len(control.primitives[n].attributes["NORMAL"]) for n in chosen])
+    rows = np.concatenate(
+        [
+            control.primitives[n].corners[control.kept[n]] + own.start
+            for n, own in zip(chosen, starts, strict=True)
+        ]
+    )
+    corners = number_by_first_appearance(labels[rows.reshape(-1)])[0].reshape(-1, 3)
+    given = np.empty((int(corners.max()) + 1, 3))
+    given[corners] = _normals_under(control, chosen, None)[rows]
     computed = corner_normals(points, faces, corners, len(given))
     shares = own_shares(given, computed)
-    if not control.is_empty:
-        at_border = np.zeros(len(given), dtype=bool)
-        of_vertex = border_vertices(control.mesh.topology())
-        at_border[corners] = of_vertex[control.cleaned.vertex_map[faces]]
-        shares[at_border] = _own_shares_at_border(
-            given, computed, points, faces, corners, at_border
-        )
-    return shares if shares.any() else None
+    at_border = np.zeros(len(given), dtype=bool)
+    of_vertex = border_vertices(control.mesh.topology())
+    at_border[corners] = of_vertex[control.cleaned.vertex_map[faces]]
+    shares[at_border] = _own_shares_at_border(given, computed, points, faces, corners, at_border)
+    if not shares.any():
+        return None
+    of_rows = np.zeros(starts[-1].stop)
+    of_rows[rows] = shares[corners]
+    return of_rows
 
 
 def own_shares(
@@ -330,7 +280,7 @@ class Shading:
 
     def rounded(self, group: Int[np.ndarray, " N"]) -> Float32[np.ndarray, "N 3"]:
         """Return the normals at rest of vertices in given groups, in single precision."""
-        return rounded_rows(self.rest, group, blocks_of(self.groups.connectivity.grid))
+        return rounded_rows(self.rest, group, Blocks(available_threads()))
 
     def under_targets(
         self, group: Int[np.ndarray, " N"]
@@ -343,8 +293,7 @@ class Shading:
 
 def shade(
     control: ControlMesh,
-    ids: Sequence[Int[np.ndarray, "F T"]],
-    grid: BarycentricGrid,
+    split: Split,
     points: Float[np.ndarray, "V 3"],
     skin_and_morph: SkinAndMorph,
     limit_normals: Float[np.ndarray, "V 3"] | None,
@@ -352,10 +301,10 @@ def shade(
 ) -> Shading | None:
     """Return the normals of a refined mesh with vertices at `points`; None without normals.
 
-    `ids` are the refined vertices at the grid points of the faces of each primitive.
-    `limit_normals`, if given, replace those of the faces, but for the author's own.
+    `split` is that of its kept faces. `limit_normals`, if given, replace those of the faces, but
+    for the author's own.
     """
-    groups = normal_groups(control, ids, grid)
+    groups = normal_groups(control, split)
     if groups is None:
         return None
     poses = 1 + len(skin_and_morph.deltas)

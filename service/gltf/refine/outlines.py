@@ -17,14 +17,15 @@ Outlines = dict[int, Int[np.ndarray, "N 2"]]
 
 
 def refined_outlines(control: ControlMesh, levels: Sequence[Topology]) -> Outlines:
-    """Return the outlines of each primitive that has some, as edges of the refined mesh.
+    """Return the outlines of primitives that have some, by number, as edges of the refined mesh.
 
-    `levels` are the topologies that are refined, control mesh first. Lines that are no edges of it,
+    `levels` are the topologies that are refined, control mesh first; none where faces have several
+    levels. Lines that are no edges of it,
     such as diagonals of polygons, are left out.
     """
     made: Outlines = {}
     for number, primitive in enumerate(control.primitives):
-        if primitive.outline is None:
+        if primitive.outline is None or not levels:
             continue
         vertex = control.weld.vertex_of[control.rows[number]]
         used = vertex >= 0
@@ -40,12 +41,15 @@ def refined_outlines(control: ControlMesh, levels: Sequence[Topology]) -> Outlin
         chains = [pairs]
         for topology in levels:
             chains.append(halves_of(topology, topology.rows_of(chains[-1])))
-        made[number] = np.concatenate([chains[0], chains[-1]])
+        made[primitive.number] = np.concatenate([chains[0], chains[-1]])
     return made
 
 
-def with_outline(refined: RefinedPrimitive, edges: Int[np.ndarray, "N 2"]) -> RefinedPrimitive:
-    """Return a refined primitive with the sides of its faces that lie on edges of its mesh."""
+def with_outline(refined: RefinedPrimitive, outlines: Outlines) -> RefinedPrimitive:
+    """Return a refined primitive with the sides of its faces that lie on its outline."""
+    edges = outlines.get(refined.source.number)
+    if edges is None:
+        return refined
     if refined.vertex is None:
         raise ValueError("the vertices of the refined mesh are not known")
     sides = np.stack([refined.faces, np.roll(refined.faces, -1, axis=1)], axis=-1).reshape(-1, 2)

@@ -5,9 +5,8 @@ begin with one vertex. Elsewhere two triangles are one quad if they are nearly c
 all attributes along their edge, and make a convex quad; of several partners a triangle takes that
 with the squarest quad, and then the nearest in the file.
 
-Catmull–Clark's first level makes a quad of every corner of a polygon. `level_one` makes these quads
-a control mesh of two triangles each, whose attributes are blended from those of the polygons; the
-levels below are then a split of triangles like any other.
+Catmull–Clark's first level makes a quad of every corner of a polygon; in the end each quad is cut
+into two triangles.
 """
 
 from __future__ import annotations
@@ -16,17 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
+from jaxtyping import Bool, Int
 
-from pns_common.carry import rules
 from pns_common.kernels.connectivity import pair_up
-from pns_common.mesh.mesh import Mesh
+from pns_common.mesh.mesh import Cleaned, Mesh
 from pns_common.mesh.rows import cross, distinct_rows, dot, norm, unit
-from pns_common.mesh.topology import Topology, build_topology, following
-from pns_common.parallel import Blocks
-from pns_common.schemes import CATMULL_CLARK
+from pns_common.mesh.topology import build_topology, following
 
-from ...meshes.barycentric_grid import at_quad_points
 from ...meshes.weld import canonical_zero
 from ...options import PolygonRule
 from ..read.primitives import TrianglePrimitive, distinct_corners
@@ -158,20 +153,19 @@ def _before(corner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons:
-    """Polygons over the vertices of a control mesh, of all its kept triangles.
+class KeptFaces:
+    """The faces that a control mesh's kept triangles are or form, primitive after primitive.
 
     Attributes:
-        mesh: the polygons to refine, each once.
-        corners: (H,) corners 3 f + k of the kept triangles, polygon after polygon, copies among
-            them; in the order of the primitives.
-        offsets: (Q + 1,) where those of each polygon begin.
-        source: (H,) the corner of `mesh` at the same vertex of the same polygon.
+        surface: the faces to refine, each once.
+        corners: (H,) corners 3 f + k of the kept triangles, face after face, copies among them.
+        offsets: (Q + 1,) where those of each face begin.
+        source: (H,) the corner of `surface` at the same vertex of the same face.
         turned: (Q,) whether a copy runs the other way round.
-        of_kept: (P,) the polygon of `mesh` that each kept triangle is part of.
+        of_kept: (P,) the face of `surface` that each kept triangle is part of.
     """
 
-    mesh: Mesh
+    surface: Mesh
     corners: Int[np.ndarray, " H"]
     offsets: Int[np.ndarray, " Q1"]
     source: Int[np.ndarray, " H"]
@@ -179,12 +173,31 @@ class Polygons:
     of_kept: Int[np.ndarray, " P"]
 
 
+def triangles_of(welded: Int[np.ndarray, "F 3"], cleaned: Cleaned) -> KeptFaces:
+    """Return triangles over welded vertices that have three different ones, copies among them."""
+    proper = cleaned.representative >= 0
+    leader = cleaned.representative[proper]
+    order = np.tile(np.arange(3), (len(leader), 1))
+    copies = np.flatnonzero(cleaned.face_map[proper] < 0)
+    if len(copies):
+        own, faces = cleaned.vertex_map[welded[proper][copies]], cleaned.mesh.faces[leader[copies]]
+        order[copies] = (own[:, :, None] == faces[:, None, :]).argmax(axis=2)
+    return KeptFaces(
+        surface=cleaned.mesh,
+        corners=np.arange(order.size),
+        offsets=np.arange(0, order.size + 1, 3),
+        source=(3 * leader[:, None] + order).reshape(-1),
+        turned=(order[:, 1] - order[:, 0]) % 3 == 2,
+        of_kept=leader,
+    )
+
+
 def polygons_of(
     mesh: Mesh,
     faces: Int[np.ndarray, "P 3"],
     found: Sequence[Found],
     kept: Sequence[Bool[np.ndarray, " F"]],
-) -> Polygons:
+) -> KeptFaces:
     """Return the polygons of kept triangles `faces`, copies among them, over a mesh's vertices.
 
     Polygons fall apart into triangles where welding parts their corners or joins two of them, where
@@ -215,8 +228,8 @@ def polygons_of(
     places = own.corners[is_leader[own.of_corner]]
     first = np.cumsum(is_leader[own.of_corner]) - 1
     offsets = np.append(0, np.cumsum(np.diff(own.offsets)[is_leader]))
-    return Polygons(
-        mesh=Mesh(mesh.vertices, (flat[places], offsets)),
+    return KeptFaces(
+        surface=Mesh(mesh.vertices, (flat[places], offsets)),
         corners=own.corners,
         offsets=own.offsets,
         source=first[source],
@@ -318,42 +331,3 @@ def _leaders(
     leader = np.full(count, count)
     np.minimum.at(leader, polygon, first[triangle])
     return leader
-
-
-def polygon_ids(polygons: Polygons, refined: Mesh, levels: int) -> Int[np.ndarray, "P T"]:
-    """Return the refined vertex at each grid point of each triangle of `level_one`.
-
-    The refined mesh has so many levels below the first.
-    """
-    own = refined.corners.reshape(len(polygons.mesh.corners), -1)[polygons.source]
-    turned = np.repeat(polygons.turned, np.diff(polygons.offsets))
-    ids = at_quad_points(own, levels)
-    if turned.any():
-        ids.reshape(len(own), -1)[turned] = at_quad_points(
-            own[turned], levels, turned=True
-        ).reshape(int(turned.sum()), -1)
-    return ids
-
-
-@dataclass(frozen=True, eq=False)
-class PolygonSplit:
-    """The first level of N rows of a primitive: its rows, edges and polygons become rows.
-
-    Attributes:
-        mesh: the polygons over these rows.
-    """
-
-    mesh: Topology
-
-    def linear(self, values: Shaped[np.ndarray, "N K"]) -> Float[np.ndarray, "M K"]:
-        """Return values of old rows, of edges' middles and of polygons' means."""
-        return rules.linear(values.astype(np.float64), self.mesh, CATMULL_CLARK, Blocks())
-
-    def nearest(self, values: Shaped[np.ndarray, "N K"]) -> Shaped[np.ndarray, "M K"]:
-        """Return values of old rows, of edges' first ends and of polygons' first corners."""
-        return rules.nearest(values, self.mesh, CATMULL_CLARK, Blocks())
-
-    @property
-    def quads(self) -> Int[np.ndarray, "H 4"]:
-        """The quad of each corner."""
-        return CATMULL_CLARK.faces(self.mesh, Blocks(), np.int64)

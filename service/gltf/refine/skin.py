@@ -21,6 +21,8 @@ POSITION = "POSITION"
 SLOTS = 4
 # Sums of weights that are multiples of 2⁻²⁴ are exact in float32, in any order.
 FLOAT_UNITS = 2**24
+# A loss of weight below this is rounding.
+NOTHING = 1e-9
 
 _SET = re.compile(r"WEIGHTS_([0-9]+)")
 _NO_JOINT = np.iinfo(np.int64).max
@@ -61,6 +63,12 @@ class SkinAndMorph:
     def any(self) -> bool:
         """True where there is a skin or a morph target."""
         return self.binding is not None or bool(self.deltas)
+
+    @property
+    def losses(self) -> tuple[int, float]:
+        """Number of vertices that lost weight, and the most that one of them lost."""
+        shares = np.zeros(0) if self.lost is None else self.lost[self.lost > NOTHING]
+        return len(shares), float(shares.max(initial=0.0))
 
     @property
     def labels(self) -> Int[np.ndarray, " N"] | None:

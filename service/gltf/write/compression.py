@@ -13,7 +13,7 @@ from jaxtyping import Float, Int, Shaped
 
 from pns_common.mesh.rows import extent
 
-from ...report import Change
+from ...changes import Change, counted
 from ...stages import Stages
 from ..constants import OUTLINE
 from ..read.compressed import DRACO
@@ -100,7 +100,7 @@ class MeshoptWriter(Writer):
 
     def changes(self) -> list[Change]:
         """Return the number of compressed views."""
-        return [Change("/bufferViews", "compressed by meshopt, exactly", self.views)]
+        return [Change("/bufferViews", "meshopt", self.views)]
 
 
 @dataclass
@@ -129,7 +129,7 @@ class DracoWriter(Writer):
         made = self._encoded(refined)
         if made is None:
             pointer = f"/meshes/{mesh}/primitives/{refined.source.number}"
-            self.plain.append(Change(pointer, "not compressed: Draco cannot hold it", 1))
+            self.plain.append(Change(pointer, "not-draco", 1))
             return super().replace(mesh, refined)
         before = refined.source.accessors
         primitive["attributes"] = {
@@ -147,8 +147,7 @@ class DracoWriter(Writer):
         if refined.outline is not None:
             drop(primitive, OUTLINE)
             pointer = f"/meshes/{mesh}/primitives/{refined.source.number}"
-            what = f"{OUTLINE} left out: Draco orders vertices anew"
-            self.plain.append(Change(pointer, what, 1))
+            self.plain.append(Change(pointer, "outlines-reordered", 1, (OUTLINE,)))
         self.encoded += 1
         return len(made.attributes["POSITION"])
 
@@ -160,8 +159,7 @@ class DracoWriter(Writer):
 
     def changes(self) -> list[Change]:
         """Return the number of compressed primitives, and each that was not."""
-        what = "compressed by Draco: positions, normals and texture coordinates rounded"
-        return [*([Change("/meshes", what, self.encoded)] if self.encoded else []), *self.plain]
+        return [*counted({"draco": self.encoded}, "/meshes"), *self.plain]
 
     def _encoded(self, refined: RefinedPrimitive) -> EncodedDraco | None:
         # Draco reorders vertices, and cannot hold morph targets.

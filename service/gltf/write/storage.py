@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 
 from pns_common.schemes.matrix import SubdivisionMatrix
 
-from ...report import Change
+from ...changes import Change, counted
 from ..constants import FAN, FLOAT, NGONS, OUTLINE, STRIP, SURFACES
 from ..read.accessors import QUANTIZATION, is_dequantised, still_needed
 from ..read.extensions import drop, withdraw
@@ -25,7 +25,7 @@ from .writer import Writer
 # `asset.extras.extras`.
 REPORT_KEY, OLD_VALUE_KEY = "pns", "extras"
 
-_MODES = {STRIP: "triangle strip written as triangles", FAN: "triangle fan written as triangles"}
+_MODES = {STRIP: "strip", FAN: "fan"}
 
 Arrays = dict[str, Shaped[np.ndarray, "..."]]
 
@@ -46,7 +46,7 @@ def remove_replaced(writer: Writer, spare: Spare) -> list[Change]:
         writer.remove(spare)
         return []
     names = ", ".join(spare.unknown)
-    return [Change("/bufferViews", f"replaced geometry kept: {names} may refer to it", 1)]
+    return [Change("/bufferViews", "geometry-kept", 1, (names,))]
 
 
 def withdraw_unused(tree: dict[str, Any]) -> None:
@@ -66,8 +66,8 @@ def leave_out_ngons(tree: dict[str, Any], mesh: int, numbers: Iterable[int]) -> 
         primitive = tree["meshes"][mesh]["primitives"][number]
         if NGONS in primitive.get("extensions", {}):
             drop(primitive, NGONS)
-            what = f"{NGONS} left out: other triangles are in place of its own"
-            changes.append(Change(f"/meshes/{mesh}/primitives/{number}", what, 1))
+            pointer = f"/meshes/{mesh}/primitives/{number}"
+            changes.append(Change(pointer, "ngons-replaced", 1, (NGONS,)))
     return changes
 
 
@@ -77,10 +77,7 @@ def _of_mesh(mesh: Mesh, plan: MeshPlan, document: Document) -> Iterator[Change]
         yield from _of_primitive(
             document, mesh.primitives[number], f"{pointer}/primitives/{number}"
         )
-    if others := len(mesh.primitives) - len(plan.primitives):
-        yield Change(
-            pointer, "points and lines left where they were, beside what is refined", others
-        )
+    yield from counted({"lines-left": len(mesh.primitives) - len(plan.primitives)}, pointer)
 
 
 def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Iterator[Change]:
@@ -92,19 +89,16 @@ def _of_primitive(document: Document, primitive: Primitive, pointer: str) -> Ite
     # Morph targets may stay sparse.
     dense = [*indices, *primitive.attributes.values()]
     sparse = sum(accessors[index].sparse is not None for index in dense)
-    if sparse:
-        yield Change(pointer, "sparse accessors written dense", sparse)
     quantised = sum(
         is_dequantised(name) and accessors[index].component_type != FLOAT
         for name, index in primitive.named
     )
-    if quantised:
-        yield Change(pointer, "quantised attributes written as float32", quantised)
+    yield from counted({"sparse": sparse, "quantised": quantised}, pointer)
     # Extensions of accessors may describe the replaced elements or name their bytes.
     lost = sorted({name for index in stored for name in accessors[index].extensions})
     if lost:
-        what = f"left out with the accessors that had them: {', '.join(lost)}"
-        yield Change(pointer, what, sum(bool(accessors[index].extensions) for index in stored))
+        count = sum(bool(accessors[index].extensions) for index in stored)
+        yield Change(pointer, "accessors-extended", count, (", ".join(lost),))
 
 
 def replaces_extras(tree: dict[str, Any]) -> bool:

@@ -12,7 +12,7 @@ from jaxtyping import Int, Shaped
 
 from pns_common.mesh.rows import extent
 
-from ...report import Change
+from ...changes import Change
 from ...stages import Stages
 from ..constants import (
     ARRAY_BUFFER,

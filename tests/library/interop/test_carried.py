@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pns_common import Creases, Mesh, ParameterError, loop, refine, subdivide
+from pns_common import Creases, Mesh, ParameterError, loop, refine
 from pns_common.interop.carried import CarriedMesh, join_by_position, refine_carried
 from tests.support.meshes import bumpy_sphere, grid
 
@@ -64,18 +64,15 @@ def test_creases_of_other_vertices_are_refused(pairs):
             refine_carried(CarriedMesh(vertices, faces), loop(), 1, {"creases": creases})
 
 
-def test_by_index_vertices_in_one_place_stay_apart_and_keep_their_numbers():
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
+def test_by_index_vertices_in_one_place_stay_apart_and_all_keep_their_numbers():
+    vertices = np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [9, 9, 9.0]]
+    )
     mesh = CarriedMesh(vertices, np.array([[0, 1, 2], [3, 5, 4]]))
     for weld, boundary in (("position", 4), ("index", 6)):
         made, refinement = refine_carried(mesh, loop(), 1, {"weld": weld})
         assert refinement.report["levels"][0]["edges"]["boundary"] == boundary
-        assert len(made.vertices) == 12
+        assert len(made.vertices) == 13
+        assert made.vertices[6].tolist() == [9, 9, 9]  # of no face
     with pytest.raises(ParameterError, match="weld"):
         refine_carried(mesh, loop(), 1, {"weld": "off"})
-
-
-def test_a_library_of_triangles_refuses_quads():
-    trimesh = pytest.importorskip("trimesh")
-    with pytest.raises(ParameterError, match="holds no quads"):
-        subdivide(trimesh.creation.box(), 1, "catmull-clark")

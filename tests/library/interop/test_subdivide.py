@@ -1,13 +1,12 @@
 """`subdivide` gives back the kind of mesh that it was given, made by the same library."""
 
-import subprocess
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from pns_common import Creases, Mesh, ParameterError, load_model, pns, refine, subdivide
+from tests.support.polygons import CUBE, CUBE_FACES
 from tests.support.split_data import FACES, SCHEME, VERTICES, same_surface
 
 
@@ -52,15 +51,9 @@ def test_polygons_are_cut_where_that_is_asked_for():
     np.testing.assert_array_equal(made.vertices, expected.vertices)
 
 
-def test_the_library_imports_none_of_the_others():
-    code = "import sys, pns_common; print(*{name.partition('.')[0] for name in sys.modules})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not set(done.stdout.split()) & {"trimesh", "pyvista", "meshio", "open3d", "vtk"}
-
-
 @pytest.mark.parametrize("name", ["crease", "creases"])
 def test_creases_are_named_as_on_the_command_line(name):
-    cube = Mesh(*box_of_triangles())
+    cube = Mesh(CUBE, CUBE_FACES).triangulated()
     off = refine(cube, "loop", 2, creases=None).mesh.vertices
     angle = refine(cube, "loop", 2, creases=Creases(angle=40)).mesh.vertices
     assert (off != angle).any()
@@ -81,15 +74,6 @@ def test_creases_are_named_as_on_the_command_line(name):
         refine(cube, "loop", 2, creases="off", crease="angle:30")
 
 
-def test_creases_of_a_librarys_mesh_are_named_so_too():
-    trimesh = pytest.importorskip("trimesh")
-    given = trimesh.Trimesh(*box_of_triangles(), process=False)
-    for options in ({"crease": "off"}, {"creases": "off"}, {"crease": None}):
-        made = subdivide(given, 1, "loop", **options)
-        expected = refine(Mesh(given.vertices, given.faces), "loop", 1, creases=None).mesh
-        np.testing.assert_array_equal(made.vertices, expected.vertices)
-
-
 @pytest.mark.parametrize(
     ("wrong", "right"), [("level", "levels"), ("sharp_creases", "creases"), ("thread", "threads")]
 )
@@ -98,9 +82,3 @@ def test_a_wrong_name_of_an_option_tells_the_right_one(wrong, right):
         subdivide((VERTICES, FACES), 1, SCHEME, **{wrong: 1})
     with pytest.raises(TypeError, match="there are weld, reference_length"):
         subdivide((VERTICES, FACES), 1, SCHEME, zzz=1)
-
-
-def box_of_triangles():
-    points = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return points, [[q[0], q[k], q[k + 1]] for q in quads for k in (1, 2)]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
 
@@ -19,12 +18,12 @@ class Outcome(NamedTuple):
 
 
 @pytest.fixture
-def pns(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+def pns(monkeypatch, capfd, tmp_path):
     """Run a command line in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
 
-    def run(*arguments: str) -> Outcome:
+    def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["pns", *arguments])
         with pytest.raises(SystemExit) as exit_:
             cli.main()
@@ -35,7 +34,7 @@ def pns(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_
 
 
 @pytest.fixture
-def part_file(tmp_path: Path) -> Path:
+def part_file(tmp_path):
     path = tmp_path / "part.glb"
     path.write_bytes(part_glb())
     return path

@@ -1,15 +1,11 @@
 """Models by name or file, help, settings, keys, and the other options."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal
 import socket
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -32,10 +28,8 @@ from tests.support.networks import default_model_bytes
         ("typer", SystemExit, "typer is missing: pip install"),
     ],
 )
-def test_only_what_others_make_can_be_missing(
-    monkeypatch: pytest.MonkeyPatch, lost: str, error: type[BaseException], text: str
-) -> None:
-    def loses_a_module() -> None:
+def test_only_what_others_make_can_be_missing(monkeypatch, lost, error, text):
+    def loses_a_module():
         raise ModuleNotFoundError("no module", name=lost)
 
     monkeypatch.setattr(cli, "main", loses_a_module)
@@ -44,7 +38,7 @@ def test_only_what_others_make_can_be_missing(
         main()
 
 
-def test_every_command_hears_sigterm_from_its_start() -> None:
+def test_every_command_hears_sigterm_from_its_start():
     """As the first process of a container it has no default, and is killed ten seconds later."""
     # What libraries do around imports that may fail.
     code = """
@@ -64,53 +58,7 @@ __main__.main()
     assert ended.returncode == 128 + signal.SIGTERM
 
 
-def test_a_model_is_a_name_or_a_file_and_the_name_wins(
-    pns: Any, tmp_path: Path, part_file: Path
-) -> None:
-    (tmp_path / "paper").write_bytes(default_model_bytes(0))
-    report = tmp_path / "r.json"
-    for given, features in (("paper", "paper-5"), ("./paper", "directed-28")):
-        command = f"subdivide part.glb -o out.glb --model {given} --report r.json"
-        assert pns(*command.split()).code == 0
-        told = json.loads(report.read_text())
-        assert told["model"] == "paper"
-        assert told["model_hash"] == load_model(given).hash
-        assert load_model(given).card.features == features
-    assert "vertex_rule" in told["levels"][0]
-    loop = "subdivide part.glb -o out.glb --scheme loop --model ./paper --report r.json"
-    assert pns(*loop.split()).code == 0
-    assert json.loads(report.read_text())["model"] is None
-
-
-def test_help_says_which_numbers_are_taken(pns: Any) -> None:
-    said = " ".join(pns("subdivide", "--help").out.replace("│", " ").split())
-    for taken in ("1 to 6", "0 to 0.01"):
-        assert taken in said
-
-
-def test_help_has_everyday_options_first(pns: Any) -> None:
-    said = pns("subdivide", "--help").out
-    order = ("Everyday", "--output", "--levels", "--crease", "--scheme", "Files", "--to")
-    order += ("Research", "--map", "--budget", "--reference-length", "--diagnostics")
-    # At the beginning of a row: options name others in their words.
-    places = [re.search(rf"^[╭│][─ *]*{word}\b", said, re.MULTILINE).start() for word in order]
-    assert places == sorted(places)
-
-
-def test_info_lists_models_and_shows_a_card(pns: Any) -> None:
-    listed = pns("info").out.splitlines()
-    assert set(bundled_models(companions=True)) <= {line.partition(" ")[0] for line in listed}
-    assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
-    shown = pns("info", "paper").out
-    model = load_model("paper")
-    assert model.hash in shown
-    assert str(model.card.budget) in shown
-    assert model.card.features in shown
-    percent = model.card.metrics["ridge-held-out"]["distance_near"]["percent"]
-    assert f"{percent:.4g}" in shown
-
-
-def test_neither_the_commands_nor_their_help_import_torch(tmp_path: Path) -> None:
+def test_neither_the_commands_nor_their_help_import_torch(tmp_path):
     code = (
         "import sys\n"
         "import service.cli, service.http.server\n"
@@ -122,15 +70,51 @@ def test_neither_the_commands_nor_their_help_import_torch(tmp_path: Path) -> Non
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
-def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Path) -> None:
+def test_a_model_is_a_name_or_a_file_and_the_name_wins(pns, tmp_path, part_file):
+    (tmp_path / "paper").write_bytes(default_model_bytes(0))
+    asks = "subdivide part.glb -o out.glb --report r.json --model"
+
+    def told(*more):
+        assert pns(*asks.split(), *more).code == 0
+        return json.loads((tmp_path / "r.json").read_text())
+
+    for given, features in (("paper", "paper-5"), ("./paper", "directed-28")):
+        report = told(given)
+        assert (report["model"], report["model_hash"]) == ("paper", load_model(given).hash)
+        assert load_model(given).card.features == features
+    assert "vertex_rule" in report["levels"][0]
+    assert told("./paper", "--scheme", "loop")["model"] is None
+
+
+def test_help_has_everyday_options_first_and_says_which_numbers_are_taken(pns):
+    said = pns("subdivide", "--help").out
+    for taken in ("1 to 6", "0 to 0.01"):
+        assert taken in " ".join(said.replace("│", " ").split())
+    order = ("Everyday", "--output", "--levels", "--crease", "--scheme", "Files", "--to")
+    order += ("Research", "--map", "--budget", "--reference-length", "--diagnostics")
+    # At the beginning of a row: options name others in their words.
+    places = [re.search(rf"^[╭│][─ *]*{word}\b", said, re.MULTILINE).start() for word in order]
+    assert places == sorted(places)
+
+
+def test_info_lists_models_and_shows_a_card(pns):
+    listed = pns("info").out.splitlines()
+    assert set(bundled_models(companions=True)) <= {line.partition(" ")[0] for line in listed}
+    assert [line.partition(" ")[0] for line in listed if " * " in line] == [DEFAULT_MODEL]
+    shown, model = pns("info", "paper").out, load_model("paper")
+    percent = model.card.metrics["ridge-held-out"]["distance_near"]["percent"]
+    for said in (model.hash, str(model.card.budget), model.card.features, f"{percent:.4g}"):
+        assert said in shown
+
+
+def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns, tmp_path):
     container = read_glb(part_glb())
     tree = msgspec.json.decode(container.text)
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "part.bin").write_bytes(bytes(container.binary or b""))
-    source = tmp_path / "in" / "part.gltf"
     for uri, code in (("part.bin", 0), ("other.bin", 1), ("../part.bin", 1)):
         tree["buffers"][0]["uri"] = uri
-        source.write_bytes(msgspec.json.encode(tree))
+        (tmp_path / "in" / "part.gltf").write_bytes(msgspec.json.encode(tree))
         done = pns("subdivide", "in/part.gltf", "-o", "out.glb", "--scheme", "loop")
         assert done.code == code
         assert len(done.err.splitlines()) == 1
@@ -138,27 +122,18 @@ def test_a_gltf_is_read_with_the_files_of_its_own_folder(pns: Any, tmp_path: Pat
 
 
 @pytest.mark.parametrize("compress", ["draco", "meshopt"])
-def test_compressed_files_are_written_and_read(pns: Any, part_file: Path, compress: str) -> None:
-    assert (
-        pns(
-            "subdivide", "part.glb", "-o", "packed.glb", "--levels", "1", "--compress", compress
-        ).code
-        == 0
-    )
+def test_compressed_files_are_written_and_read(pns, part_file, compress):
+    packed = f"subdivide part.glb -o packed.glb --levels 1 --compress {compress}"
+    assert pns(*packed.split()).code == 0
     assert tree_of(part_file.with_name("packed.glb"))["extensionsRequired"]
     done = pns("subdivide", "packed.glb", "-o", "again.obj", "--levels", "1")
     assert done.code == 0
     assert f"{16 * FACES:,} triangles" in done.err
 
 
-def test_a_file_of_keys_that_cannot_be_used_ends_it(
-    pns: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PNS_KEYS_FILE", str(tmp_path / "none.toml"))
-    code, _, err = pns("serve", "--port", "0")
-    assert code == 1
-    assert err.splitlines()[-1].startswith("pns: ")
-    assert "none.toml" in err
+# `pns serve`
+
+USED = "Address already in use"
 
 
 @pytest.mark.parametrize(
@@ -169,53 +144,42 @@ def test_a_file_of_keys_that_cannot_be_used_ends_it(
         ({"PNS_PROVIDERS": "Foo"}, "PNS_PROVIDERS: providers = ('Foo',): "),
         ({"PNS_IGNORE_UNKNOWN": "maybe"}, "PNS_IGNORE_UNKNOWN: "),
         ({"PNS_HOSTS": "pns.example,a b"}, "PNS_HOSTS: 'a b' is no host name"),
+        ({"PNS_KEYS_FILE": "none.toml"}, ""),
+        ({"PNS_HOST": "300.0.0.1"}, ""),
+        ({"PNS_PORT": "TAKEN"}, f"{USED}"),
+        (
+            {"PNS_METRICS_PORT": "TAKEN"},
+            f"metrics on 127.0.0.1:TAKEN: {USED}; give a PNS_METRICS_PORT that is free",
+        ),
+        (
+            {"PNS_PORT": "FREE", "PNS_METRICS_PORT": "FREE"},
+            f"metrics on 127.0.0.1:FREE: {USED}; give a PNS_METRICS_PORT that is free, and not",
+        ),
     ],
 )
-def test_a_setting_that_cannot_be_used_ends_it_by_name(
-    pns: Any, monkeypatch: pytest.MonkeyPatch, settings: dict[str, str], said: str
-) -> None:
-    for name, value in settings.items():
-        monkeypatch.setenv(name, value)
-    code, _, err = pns("serve", "--port", "0")
+def test_a_setting_that_cannot_be_used_ends_it_in_one_line(pns, monkeypatch, settings, said):
+    with (
+        socket.create_server(("127.0.0.1", 0)) as taken,
+        socket.create_server(("127.0.0.1", 0)) as free,
+    ):
+        ports = {"TAKEN": taken, "FREE": free}
+        ports = {word: str(each.getsockname()[1]) for word, each in ports.items()}
+        free.close()
+        for name, value in ({"PNS_PORT": "0"} | settings).items():
+            monkeypatch.setenv(name, ports.get(value, value))
+        code, out, err = pns("serve")
+    for word, port in ports.items():
+        said = said.replace(word, port)
     assert code != 0
+    assert out == ""
     assert err.startswith(f"pns: {said}")
+    assert said or any(value in err for value in settings.values())
+    assert "Traceback" not in err
     assert len(err.splitlines()) == 1
 
 
-def test_a_port_that_is_taken_ends_it_in_one_line(pns: Any) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        code, out, err = pns("serve", "--port", str(port))
-    assert (code, out) == (1, "")
-    assert err.startswith("pns: Address already in use")
-    assert f"{port}" in err
-    assert err.count("\n") == 1
-
-
-def test_a_host_that_is_none_ends_it_in_one_line(pns: Any) -> None:
-    code, out, err = pns("serve", "--host", "300.0.0.1", "--port", "0")
-    assert (code, out) == (1, "")
-    assert "300.0.0.1" in err
-    assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize("its_own", [False, True])
-def test_a_place_for_metrics_that_cannot_be_had_ends_it_by_name(
-    pns: Any, monkeypatch: pytest.MonkeyPatch, its_own: bool
-) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        if its_own:
-            taken.close()
-        monkeypatch.setenv("PNS_METRICS_PORT", str(port))
-        code, _, err = pns("serve", "--port", str(port) if its_own else "0")
-    hint = "give a PNS_METRICS_PORT that is free, and not PNS_PORT"
-    text = f"pns: metrics on 127.0.0.1:{port}: Address already in use; {hint}\n"
-    assert (code, err) == (1, text)
-
-
 @pytest.mark.parametrize("budget", [5e6, 1234567.0, 0.1, 1e16])
-def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
+def test_a_key_and_its_entry(pns, tmp_path, budget):
     code, entry, fresh = pns("key", "studio", "--faces-per-minute", f"{budget!r}")
     assert code == 0
     file = tmp_path / "keys.toml"
@@ -226,52 +190,43 @@ def test_a_key_and_its_entry(pns: Any, tmp_path: Path, budget: float) -> None:
     assert fresh.strip() not in entry
 
 
-def test_a_key_of_an_impossible_name_is_refused(pns: Any) -> None:
-    code, out, err = pns("key", "Studio")
-    assert (code, out) == (1, "")
-    assert "a name is 1 to 63 of" in err
+# Nothing speaks to the terminal
 
 
-def test_a_files_name_cannot_speak_to_the_terminal(pns: Any) -> None:
-    code, _, err = pns("subdivide", "\x1b[31mred\x9b.glb", "-o", "out.glb")
-    assert code != 0
-    assert "\\x1b[31mred\\x9b.glb" in err
-    assert err.replace("\n", "").isprintable()
-
-
-def test_what_a_file_holds_cannot_speak_to_the_terminal(pns: Any, tmp_path: Path) -> None:
+def red_glb():
     tree = tree_of_bytes(part_glb())
     primitive = tree["meshes"][0]["primitives"][0]
     primitive["attributes"]["_\x1b[31mRED"] = primitive["attributes"]["POSITION"]
-    binary = read_glb(part_glb()).binary
-    (tmp_path / "red.glb").write_bytes(write_glb(msgspec.json.encode(tree), [binary], []))
-    code, _, err = pns("subdivide", "red.glb", "-o", "out.obj")
-    assert code == 0
-    assert "attribute _\\x1b[31mRED dropped" in err
-    assert err.replace("\n", "").isprintable()
+    return write_glb(msgspec.json.encode(tree), [read_glb(part_glb()).binary], [])
 
 
-@pytest.mark.parametrize("more", [[], ["--dry-run"]])
-def test_a_library_s_names_cannot_speak_to_the_terminal(
-    pns: Any, tmp_path: Path, more: list[str]
-) -> None:
+BATCH = "batch in out --scheme loop --workers 1 --report r.jsonl"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["subdivide", "\x1b[31mred\x9b.glb", "-o", "out.glb"], "\\x1b[31mred\\x9b.glb"),
+        (["subdivide", "red.glb", "-o", "out.obj"], "attribute _\\x1b[31mRED dropped"),
+        (BATCH.split(), "\\x1b[31mred\\n.obj: "),
+        ([*BATCH.split(), "--dry-run"], "\\x1b[31mred\\n.obj: "),
+    ],
+    ids=["a name", "what a file holds", "a library's names", "before it is refined"],
+)
+def test_names_and_contents_cannot_speak_to_the_terminal(pns, tmp_path, arguments, says):
+    (tmp_path / "red.glb").write_bytes(red_glb())
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "\x1b[31mred\n.obj").write_text("bad")
     (tmp_path / "in" / "\x1b[31mplain.glb").write_bytes(part_glb())
-    arguments = ["--scheme", "loop", "--workers", "1", "--report", "r.jsonl", *more]
-    _, _, err = pns("batch", "in", "out", *arguments)
-    assert "\\x1b[31mred\\n.obj: " in err
+    err = pns(*arguments).err
+    assert says in err
     assert err.replace("\n", "").isprintable()
 
 
-def test_an_error_names_the_file_that_it_is_in(pns: Any, tmp_path: Path) -> None:
-    (tmp_path / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n")
-    outcome = pns("subdivide", "bad.obj", "-o", "out.obj")
-    assert outcome.code == 1
-    assert outcome.err.startswith("pns: bad.obj: line 3 ")
+# `pns doctor`
 
 
-def test_the_doctor_finds_this_machine_well(pns: Any) -> None:
+def test_the_doctor_finds_this_machine_well(pns):
     outcome = pns("doctor")
     assert outcome.code == 0, outcome.out
     lines = outcome.out.splitlines()
@@ -279,13 +234,10 @@ def test_the_doctor_finds_this_machine_well(pns: Any) -> None:
     assert {"pns", "numpy", "kernels", "models", "self-test"} <= {line.split()[1] for line in lines}
 
 
-def test_the_doctor_goes_on_after_what_is_wrong_and_ends_with_1(
-    pns: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_doctor_goes_on_after_what_is_wrong_and_ends_with_1(pns, monkeypatch):
     monkeypatch.setenv("PNS_FOO", "1")
     outcome = pns("doctor")
     assert outcome.code == 1
-    failed = [line for line in outcome.out.splitlines() if line.startswith("FAIL")]
-    assert len(failed) == 1
-    assert "PNS_FOO" in failed[0]
+    (failed,) = [line for line in outcome.out.splitlines() if line.startswith("FAIL")]
+    assert "PNS_FOO" in failed
     assert "self-test" in outcome.out.splitlines()[-1]

@@ -1,7 +1,5 @@
 """The command line does its work where POSIX is missing."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -12,13 +10,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def pns_without_posix(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def pns_without_posix(folder, *arguments):
     command = (sys.executable, "-m", "tests.support.without_posix", *arguments)
     environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 
 
-def test_files_are_refined_without_posix(tmp_path: Path, part_file: Path) -> None:
+def test_files_are_refined_without_posix(tmp_path, part_file):
     for arguments in (
         ("example", "other.glb"),
         ("subdivide", "other.glb", "-o", "finer.glb", "--report", "report.json"),
@@ -39,9 +37,7 @@ def test_files_are_refined_without_posix(tmp_path: Path, part_file: Path) -> Non
         ("batch", ".", "refined", "--report", "report.jsonl"),
     ],
 )
-def test_what_needs_posix_says_so(
-    tmp_path: Path, part_file: Path, arguments: tuple[str, ...]
-) -> None:
+def test_what_needs_posix_says_so(tmp_path, part_file, arguments):
     before = sorted(tmp_path.iterdir())
     done = pns_without_posix(tmp_path, *arguments)
     assert done.returncode == 1

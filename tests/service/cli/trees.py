@@ -1,10 +1,5 @@
 """Readers of the files that the command line wrote."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import msgspec
 
 from service.gltf.read.container import read_glb
@@ -13,9 +8,9 @@ from service.gltf.read.container import read_glb
 FACES = 1920
 
 
-def tree_of(path: Path) -> dict[str, Any]:
+def tree_of(path):
     return msgspec.json.decode(read_glb(path.read_bytes()).text)
 
 
-def tree_of_bytes(glb: bytes) -> dict[str, Any]:
+def tree_of_bytes(glb):
     return msgspec.json.decode(read_glb(glb).text)

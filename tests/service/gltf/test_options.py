@@ -132,7 +132,12 @@ def test_a_weld_tolerance_closes_what_does_not_quite_meet():
     result = subdivide([loose], weld_tolerance=1e-3)
     assert result.report["levels"][0]["edges"]["boundary"] == 0
     assert result.report["changes"] == [
-        {"pointer": "/meshes/0", "what": "vertices joined within weld_tolerance", "count": 18}
+        {
+            "pointer": "/meshes/0",
+            "code": "joined",
+            "what": "vertices joined within weld_tolerance",
+            "count": 18,
+        }
     ]
     # It is relative to R: a mesh a million times larger is welded alike.
     large = {"POSITION": 1e6 * loose["POSITION"]}

@@ -1,9 +1,5 @@
 """A service alone, one behind the proxy of deploy/, and a client of a module's own service."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import httpx2
 import pytest
 
@@ -14,9 +10,7 @@ MIB = 2**20
 
 
 @pytest.fixture(scope="module", params=["alone", "behind the proxy"])
-def front(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[tuple[str, int]]:
+def front(request, tmp_path_factory):
     """The address of a service of small bodies, which waits for nobody for long."""
     if request.param == "alone":
         with served(workers=1, body=MIB, idle_seconds=0.5, keep_alive_seconds=1) as address:
@@ -31,9 +25,8 @@ def front(
 
 
 @pytest.fixture
-def client(address: tuple[str, int]) -> Iterator[httpx2.Client]:
+def client(address):
     """A client of the `address` of a module's own service."""
-    with httpx2.Client(
-        base_url=f"http://{address[0]}:{address[1]}", headers=GLB, timeout=600
-    ) as opened:
+    url = f"http://{address[0]}:{address[1]}"
+    with httpx2.Client(base_url=url, headers=GLB, timeout=600) as opened:
         yield opened

@@ -1,30 +1,23 @@
 """No client receives what belongs to another, whoever disconnects when."""
 
-from __future__ import annotations
-
 import asyncio
 import hashlib
 import random
-from asyncio import StreamReader, StreamWriter
-from collections.abc import Callable
-from pathlib import Path
-
-import pytest
 
 from service.workers import pool
 from tests.support import stand_in_jobs as jobs
 from tests.support.live import served
 
-ANSWERS = 2_000
+ANSWERS = 1_000
 # Each costs a worker's life, and the start of its successor.
-DISCONNECTS = 48
+DISCONNECTS = 32
 HONEST = 32
 RUDE = 8
 
 Address = tuple[str, int]
 
 
-async def sent(where: Address, body: bytes, told: str) -> tuple[StreamReader, StreamWriter]:
+async def sent(where, body, told):
     """A connection that has sent a whole request; its content type tells the worker more."""
     reader, writer = await asyncio.open_connection(*where)
     head = (
@@ -36,7 +29,7 @@ async def sent(where: Address, body: bytes, told: str) -> tuple[StreamReader, St
     return reader, writer
 
 
-async def content(reader: StreamReader, writer: StreamWriter) -> bytes:
+async def content(reader, writer):
     """The content of the answer."""
     try:
         head, _, rest = (await reader.read()).partition(b"\r\n\r\n")
@@ -47,29 +40,29 @@ async def content(reader: StreamReader, writer: StreamWriter) -> bytes:
         await writer.wait_closed()
 
 
-def digest(body: bytes) -> bytes:
+def digest(body):
     return hashlib.sha256(body).hexdigest().encode()
 
 
-def test_answers_beside_clients_that_disconnect_are_each_of_their_own_input() -> None:
+def test_answers_beside_clients_that_disconnect_are_each_of_their_own_input():
     chance = random.Random(7)
     bodies = [chance.randbytes(chance.randrange(1, 4096)) for _ in range(ANSWERS)]
-    wrong: list[int] = []
+    wrong = []
 
-    async def honest(where: Address, waiting: list[int]) -> None:
+    async def honest(where, waiting):
         while waiting:
             number = waiting.pop()
             connection = await sent(where, bodies[number], "before=0; after=0.004")
             if await content(*connection) != digest(bodies[number]):
                 wrong.append(number)
 
-    async def rude(where: Address, times: int) -> None:
+    async def rude(where, times):
         for _ in range(times):
             _, writer = await sent(where, chance.randbytes(1000), "before=0.1; after=0")
             await asyncio.sleep(chance.uniform(0, 0.15))
             writer.transport.abort()
 
-    async def scenario(where: Address) -> None:
+    async def scenario(where):
         waiting = list(range(ANSWERS))
         async with asyncio.timeout(300), asyncio.TaskGroup() as clients:
             for _ in range(HONEST):
@@ -82,15 +75,13 @@ def test_answers_beside_clients_that_disconnect_are_each_of_their_own_input() ->
     assert wrong == []
 
 
-def test_a_worker_that_outlives_its_request_writes_into_no_other_answer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_that_outlives_its_request_writes_into_no_other_answer(tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "GRACE_SECONDS", 30)
     late, patient = tmp_path / "late", tmp_path / "patient"
     late.mkdir()
     patient.mkdir()
 
-    async def scenario(where: Address) -> None:
+    async def scenario(where):
         _, leaving = await sent(where, b"late", f"folder={late}")
         await until((late / "read").exists)
         leaving.transport.abort()
@@ -114,6 +105,6 @@ def test_a_worker_that_outlives_its_request_writes_into_no_other_answer(
         asyncio.run(asyncio.wait_for(scenario(where), 60))
 
 
-async def until(holds: Callable[[], bool]) -> None:
+async def until(holds):
     while not holds():
         await asyncio.sleep(0.002)

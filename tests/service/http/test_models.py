@@ -1,18 +1,11 @@
 """Models by name: in GET /models, in a request's `model=`, and in a worker."""
 
-from __future__ import annotations
-
 import json
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
-from typing import Any
 
-import httpx2
 import pytest
-from fastapi.testclient import TestClient
 
 from pns_common.model import file as model_file
 from pns_common.model.file import DEFAULT_MODEL, load_model
@@ -27,12 +20,11 @@ from tests.support.networks import DEFAULT_CARD
 from tests.support.packages import served_file, several_models
 from tests.support.stand_in_models import ZeroModel
 
-REPORT = "/report?diagnostics=none"
 NAMES = sorted({"broken", "paper", "vertices", DEFAULT_MODEL})
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return several_models(tmp_path_factory.mktemp("package") / "models")
 
 
@@ -40,65 +32,65 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def client(folder: Path) -> Iterator[TestClient]:
+def client(folder):
     warm_up = partial(jobs.hold_among, str(folder))
     with local(create_app(Settings(workers=1), warm_up=warm_up)) as opened:
         yield opened
 
 
-def subdivide(client: TestClient, query: str) -> httpx2.Response:
-    return client.post(f"{REPORT}&{query}", content=part_glb(), headers=GLB)
+def asked(client, query):
+    return client.post(f"/report?diagnostics=none&{query}", content=part_glb(), headers=GLB)
 
 
-def report(client: TestClient, query: str) -> dict[str, Any]:
-    answer = subdivide(client, query)
+def report(client, query):
+    answer = asked(client, query)
     assert answer.status_code == 200, answer.text
     return answer.json()
 
 
-def test_a_request_picks_its_model_by_name(client: TestClient) -> None:
-    paper = report(client, "model=paper")
+def test_a_request_picks_its_model_by_name(client, caplog):
+    with caplog.at_level("INFO", logger="pns.service"):
+        paper, both = report(client, "model=paper"), report(client, "model=vertices")
     assert (paper["model"], paper["model_hash"]) == ("paper", load_model("paper").hash)
     assert paper["budget"] == load_model("paper").card.budget
-    both = report(client, "model=vertices")
-    assert both["model"] == "vertices"
-    assert both["budget"] == DEFAULT_CARD.budget
+    assert (both["model"], both["budget"]) == ("vertices", DEFAULT_CARD.budget)
     assert both["levels"][0]["vertex_rule"]["proximity_ratio"]["max"] > 0.01
+    assert "auto (vertices) levels=2" in caplog.text
     assert report(client, "")["model"] == DEFAULT_MODEL
     assert report(client, "model=") == report(client, f"model={DEFAULT_MODEL}")
 
 
 @pytest.mark.parametrize("name", ["pape", "Paper", "./paper", "paper.onnx", "/etc/passwd", "../x"])
 @pytest.mark.parametrize("scheme", ["pns", "loop"])
-def test_422_for_what_is_no_models_name(client: TestClient, name: str, scheme: str) -> None:
-    answer = subdivide(client, f"model={name}&scheme={scheme}")
-    assert answer.status_code == 422
+def test_422_for_what_is_no_models_name(client, name, scheme):
+    answer = asked(client, f"model={name}&scheme={scheme}")
     document = answer.json()
+    assert answer.status_code == 422
     assert (document["code"], document["parameter"]) == ("invalid-parameter", "model")
     assert document["choices"] == NAMES
     assert all(known in document["detail"] for known in NAMES)
 
 
-def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client: TestClient) -> None:
-    plain = report(client, "scheme=loop")
+def test_loop_needs_no_model_and_takes_a_name_as_it_takes_a_budget(client, caplog):
+    with caplog.at_level("INFO", logger="pns.service"):
+        plain = report(client, "scheme=loop")
+    assert "loop levels=2" in caplog.text
     assert report(client, "scheme=loop&model=vertices&budget=0.5") == plain
     assert plain["model"] is plain["budget"] is None
     # Not even loaded.
     assert report(client, "scheme=loop&model=broken") == plain
 
 
-def test_503_for_a_bundled_model_that_does_not_load_and_for_it_alone(client: TestClient) -> None:
-    answer = subdivide(client, "model=broken")
-    assert answer.status_code == 503
-    assert answer.json()["code"] == "no-model"
+def test_503_for_a_bundled_model_that_does_not_load_and_for_it_alone(client):
+    answer = asked(client, "model=broken")
+    assert (answer.status_code, answer.json()["code"]) == (503, "no-model")
     assert "broken" in answer.json()["detail"]
     assert report(client, "model=paper")["model"] == "paper"
     assert client.get("/readyz").status_code == 200
 
 
-def test_models_are_listed_with_what_their_files_say(client: TestClient, folder: Path) -> None:
+def test_models_are_listed_with_what_their_files_say(client, folder):
     answer = client.get("/models")
-    assert answer.status_code == 200
     assert answer.headers["content-type"] == "application/json"
     entries = {entry["name"]: entry for entry in answer.json()}
     # One that does not load has nothing to say of itself.
@@ -113,33 +105,24 @@ def test_models_are_listed_with_what_their_files_say(client: TestClient, folder:
     assert set(properties["properties"]) == set(entries["paper"])
 
 
-def test_the_list_is_kept_by_clients_and_asked_for_again_at_no_cost(client: TestClient) -> None:
+def test_the_list_is_kept_by_clients_and_asked_for_again_at_no_cost(client):
     answer = client.get("/models")
     tag = answer.headers["etag"]
     assert answer.headers["cache-control"] == "no-cache"
     assert client.get("/models").content == answer.content
     again = client.get("/models", headers={"If-None-Match": tag})
-    assert (again.status_code, again.content) == (304, b"")
-    assert again.headers["etag"] == tag
+    assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
     assert client.get("/models", headers={"If-None-Match": '"other"'}).status_code == 200
 
 
-def test_the_log_names_the_model(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level("INFO", logger="pns.service"):
-        report(client, "model=vertices")
-        report(client, "scheme=loop")
-    assert "auto (vertices) levels=2" in caplog.text
-    assert "loop levels=2" in caplog.text
-
-
-def test_503_for_the_list_while_no_worker_can_read_it() -> None:
+def test_503_for_the_list_while_no_worker_can_read_it():
     settings = Settings(workers=1, queue=0, job_seconds=1)
     app = create_app(settings, warm_up=partial(jobs.stay_away, 60.0))
     with local(app) as client:
         began = time.monotonic()
         answer = client.get("/models")
         assert (answer.status_code, answer.json()["code"]) == (503, "busy")
-        assert subdivide(client, "model=paper").status_code == 503
+        assert asked(client, "model=paper").status_code == 503
         assert time.monotonic() - began < 10
 
 
@@ -147,11 +130,11 @@ def test_503_for_the_list_while_no_worker_can_read_it() -> None:
 
 
 @pytest.fixture
-def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Models]:
+def serving(folder, monkeypatch):
     """The models of a worker, by what it is to serve, and on which providers."""
     monkeypatch.setattr(model_file, "BUNDLED", folder)
 
-    def hold(*served: object) -> Models:
+    def hold(*served):
         models = Models()
         models.hold(*served)
         return models
@@ -159,14 +142,12 @@ def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Mode
     return hold
 
 
-def entries_of(models: Models) -> dict[tuple[str, bool], dict[str, object]]:
+def entries_of(models):
     listed = json.loads(catalogue_of(models).content)
     return {(entry["name"], entry["default"]): entry for entry in listed}
 
 
-def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(
-    serving: Callable[..., Models], tmp_path: Path
-) -> None:
+def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(serving, tmp_path):
     mine, zero = served_file(tmp_path / "mine.onnx"), ZeroModel()
     sources = (None, DEFAULT_MODEL), ("vertices", "vertices"), (mine, "mine"), (zero, "zero")
     for source, name in sources:
@@ -180,9 +161,7 @@ def test_without_a_name_the_served_one_runs_and_every_bundled_one_by_name(
     assert entry.items() >= (asdict(zero.card) | {"size": None}).items()
 
 
-def test_a_bundled_name_wins_over_that_of_the_served_file(
-    serving: Callable[..., Models], tmp_path: Path
-) -> None:
+def test_a_bundled_name_wins_over_that_of_the_served_file(serving, tmp_path):
     models = serving(served_file(tmp_path / "paper.onnx"))
     assert models.get("paper").hash == load_model("paper").hash != models.get().hash
     listed = entries_of(models)
@@ -190,24 +169,18 @@ def test_a_bundled_name_wins_over_that_of_the_served_file(
     assert listed["paper", True]["hash"] == models.get().hash
 
 
-def test_a_served_file_that_does_not_load_has_a_name_and_no_entry(
-    serving: Callable[..., Models],
-) -> None:
+def test_what_is_served_says_what_is_missing_when_it_is_loaded(serving, tmp_path, caplog):
+    """Polygons are left to the classic rule; a file that does not load has a name and no entry."""
+    catalogue_of(serving(None))
+    assert "companion" not in caplog.text
+    catalogue_of(serving(served_file(tmp_path / "mine.onnx")))
+    assert "model mine has no companion for polygons" in caplog.text
     missing = serving("missing.onnx")
     assert not any(default for _, default in entries_of(missing))
     assert "missing" in catalogue_of(missing).names
 
 
-def test_a_model_that_leaves_polygons_to_the_classic_rule_says_so_when_it_is_loaded(
-    serving: Callable[..., Models], tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    catalogue_of(serving(None))
-    assert "companion" not in caplog.text
-    catalogue_of(serving(served_file(tmp_path / "mine.onnx")))
-    assert "model mine has no companion for polygons" in caplog.text
-
-
-def test_every_model_runs_on_the_providers_that_are_set(serving: Callable[..., Models]) -> None:
+def test_every_model_runs_on_the_providers_that_are_set(serving):
     entries = entries_of(serving(None, ("CPUExecutionProvider",)))
     assert all(entry["providers"] == ["CPUExecutionProvider"] for entry in entries.values())
     with pytest.raises(NoModelError, match=r"SpareExecutionProvider.*CPUExecutionProvider"):

@@ -108,45 +108,45 @@ def check(seen, output):
     assert b'"pns"' in read_glb(output.read_bytes()).text
 
 
-def test_the_generated_python_client_works(document, address, tmp_path):
+def run(*command, folder):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def described(document, tmp_path):
+    """A folder with the description and a file to send."""
+    (tmp_path / "openapi.json").write_text(json.dumps(document))
+    (tmp_path / "part.glb").write_bytes(part_glb())
+    return tmp_path
+
+
+def test_the_generated_python_client_works(described, address):
     tool = generator()
-    described = tmp_path / "openapi.json"
-    described.write_text(json.dumps(document))
-    source, output = tmp_path / "part.glb", tmp_path / "refined.glb"
-    source.write_bytes(part_glb())
-    config = tmp_path / "config.yml"
     # Formatting what was made is for people.
-    config.write_text("post_hooks: []\n")
-    command = [tool, "generate", "--path", described, "--config", config, "--meta", "none"]
-    made = [*command, "--output-path", tmp_path / "generated"]
-    subprocess.run(made, check=True, capture_output=True, cwd=tmp_path)
-    python = tool.with_name("python")
-    run = [python, SUPPORT / "python_client.py", tmp_path, address, source, output]
-    done = subprocess.run(run, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    seen = json.loads(done.stdout)
-    check(seen, output)
+    (described / "config.yml").write_text("post_hooks: []\n")
+    options = "generate --path openapi.json --config config.yml --meta none"
+    run(tool, *options.split(), "--output-path", "generated", folder=described)
+    client = SUPPORT / "python_client.py"
+    files = "part.glb", "refined.glb"
+    said = run(tool.with_name("python"), client, described, address, *files, folder=described)
+    seen = json.loads(said)
+    check(seen, described / "refined.glb")
     # The bytes alone, without a form around them.
     assert seen["raw"] is True
 
 
-def test_the_generated_typescript_client_works(document, address, tmp_path):
+def test_the_generated_typescript_client_works(described, address):
     node_tools.install()
-    (tmp_path / "node_modules").symlink_to(node_tools.FOLDER / "node_modules")
-    (tmp_path / "package.json").write_text('{"type": "module"}')
-    (tmp_path / "openapi.json").write_text(json.dumps(document))
-    (tmp_path / "client.mts").write_bytes((node_tools.FOLDER / "client.mts").read_bytes())
-    source, output = tmp_path / "part.glb", tmp_path / "refined.glb"
-    source.write_bytes(part_glb())
-    tools = tmp_path / "node_modules" / ".bin"
-    compile_ = "--strict --target es2022 --module nodenext --lib es2022 --types node --skipLibCheck"
-    for command in (
-        [tools / "openapi-typescript", "openapi.json", "--output", "openapi.d.ts"],
-        [tools / "tsc", *compile_.split(), "--rewriteRelativeImportExtensions", "client.mts"],
-    ):
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
-    run = ["node", "client.mjs", address, source, output]
-    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    check(json.loads(done.stdout), output)
+    (described / "node_modules").symlink_to(node_tools.FOLDER / "node_modules")
+    (described / "package.json").write_text('{"type": "module"}')
+    (described / "client.mts").write_bytes((node_tools.FOLDER / "client.mts").read_bytes())
+    tools = described / "node_modules" / ".bin"
+    options = "--strict --target es2022 --module nodenext --lib es2022 --types node --skipLibCheck"
+    options += " --rewriteRelativeImportExtensions client.mts"
+    made = "openapi.json", "--output", "openapi.d.ts"
+    run(tools / "openapi-typescript", *made, folder=described)
+    run(tools / "tsc", *options.split(), folder=described)
+    said = run("node", "client.mjs", address, "part.glb", "refined.glb", folder=described)
+    check(json.loads(said), described / "refined.glb")

@@ -1,19 +1,13 @@
 """The whole service on real files: workers, pipeline and bundled model together."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import zipfile
-from collections.abc import Iterator
-from typing import Any
 
-import httpx2
 import msgspec
 import pytest
-from fastapi.testclient import TestClient
 
-from service.bodies.media import MEDIA_TYPES, Kind
+from service.bodies.media import MEDIA_TYPES
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
 from service.meshfiles import formats
@@ -28,67 +22,57 @@ from tests.support.live import GLB, local, until
 from tests.support.stand_in_models import CountedModel
 
 FACES = 1920
+PART = part_glb()
 
 
 @pytest.fixture(scope="module")
-def client() -> Iterator[TestClient]:
-    with local(create_app(Settings(workers=1, faces=100_000))) as opened:
+def client():
+    with local(create_app(Settings(workers=1, faces=100_000), warm_up=hold_model)) as opened:
         until(lambda: opened.get("/readyz").status_code == 200)
         yield opened
 
 
-@pytest.fixture(scope="module")
-def part() -> bytes:
-    return part_glb()
+def post(client, query="", body=PART, **headers):
+    return client.post(f"/subdivide?{query}", content=body, headers=GLB | headers)
 
 
-def tree_of(glb: bytes) -> dict[str, Any]:
+def tree_of(glb):
     return msgspec.json.decode(read_glb(glb).text)
 
 
-def report_of(answer: httpx2.Response) -> dict[str, Any]:
+def report_of(answer):
     assert answer.status_code == 200, answer.text
     return tree_of(answer.content)["asset"]["extras"]["pns"]
 
 
-def test_a_body_in_gzip_is_refined_as_it_was_before(client: TestClient, part: bytes) -> None:
-    plain = client.post("/subdivide", content=part, headers=GLB)
-    packed = client.post(
-        "/subdivide", content=gzip.compress(part), headers=GLB | {"Content-Encoding": "gzip"}
-    )
-    assert packed.status_code == 200
-    assert packed.content == plain.content
-
-
-def test_a_raw_glb_is_refined_and_carries_its_report(client: TestClient, part: bytes) -> None:
-    answer = client.post("/subdivide?levels=2", content=part, headers=GLB)
+def test_a_glb_is_refined_and_carries_its_report_which_comes_alone_too(client):
+    answer = post(client, "levels=2")
     assert answer.headers["content-type"] == "model/gltf-binary"
-    report = report_of(answer)
-    assert report["scheme"] == "pns"
-    assert report["totals"]["faces"] == 16 * FACES
-    assert [level["faces"] for level in report["levels"]] == [4 * FACES, 16 * FACES]
-    assert tree_of(answer.content)["materials"] == tree_of(part)["materials"]
     assert "refine;dur=" in answer.headers["server-timing"]
+    report = report_of(answer)
+    assert (report["scheme"], report["totals"]["faces"]) == ("pns", 16 * FACES)
+    assert [level["faces"] for level in report["levels"]] == [4 * FACES, 16 * FACES]
+    assert tree_of(answer.content)["materials"] == tree_of(PART)["materials"]
+    alone = post(client, Accept="application/json")
+    assert alone.headers["content-type"] == "application/json"
+    assert alone.json() == report
 
 
-def test_every_way_to_send_a_file_gives_the_same_answer(client: TestClient, part: bytes) -> None:
-    raw = client.post("/subdivide", content=part, headers=GLB)
+def test_every_way_to_send_a_file_gives_the_same_answer(client):
+    raw = post(client)
+    encoded = {"Content-Encoding": "gzip"}
+    assert post(client, body=gzip.compress(PART), **encoded).content == raw.content
     for kind in ("application/octet-stream", "model/gltf-binary"):
-        form = client.post("/subdivide", files={"file": ("part.glb", part, kind)})
+        form = client.post("/subdivide", files={"file": ("part.glb", PART, kind)})
         assert form.content == raw.content
-    text = as_gltf_json(part, Limits())
-    as_json = client.post(
-        "/subdivide", content=text, headers={"Content-Type": "model/gltf+json; charset=utf-8"}
-    )
-    in_form = client.post("/subdivide", files={"file": text})
-    assert as_json.content == in_form.content
+    text = as_gltf_json(PART, Limits())
+    as_json = post(client, body=text, **{"Content-Type": "model/gltf+json; charset=utf-8"})
+    assert as_json.content == client.post("/subdivide", files={"file": text}).content
     assert report_of(as_json)["levels"] == report_of(raw)["levels"]
 
 
-def test_files_beside_the_document_come_as_parts_or_in_an_archive(
-    client: TestClient, part: bytes
-) -> None:
-    container = read_glb(part)
+def test_files_beside_the_document_come_as_parts_or_in_an_archive(client):
+    container = read_glb(PART)
     tree = msgspec.json.decode(container.text)
     tree["buffers"][0]["uri"] = "data/part%201.bin"
     text, binary = msgspec.json.encode(tree), bytes(container.binary or b"")
@@ -98,57 +82,47 @@ def test_files_beside_the_document_come_as_parts_or_in_an_archive(
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("scene/part.gltf", text)
         archive.writestr("scene/data/part 1.bin", binary)
-    raw = client.post(
-        "/subdivide", content=packed.getvalue(), headers={"Content-Type": "application/zip"}
-    )
+    raw = post(client, body=packed.getvalue(), **{"Content-Type": "application/zip"})
     in_form = client.post("/subdivide", files={"file": ("part.zip", packed.getvalue())})
     assert report_of(in_parts)["totals"]["faces"] == 16 * FACES
     assert in_parts.content == raw.content == in_form.content
-
     missing = client.post("/subdivide", files={"file": ("part.gltf", text)})
-    assert missing.status_code == 422
-    assert missing.json()["code"] == "missing-file"
-    assert missing.json()["pointer"] == "/buffers/0/uri"
+    pointed = missing.json()["code"], missing.json()["pointer"]
+    assert (missing.status_code, *pointed) == (422, "missing-file", "/buffers/0/uri")
 
 
-def test_accept_json_gives_the_same_report_alone(client: TestClient, part: bytes) -> None:
-    whole = client.post("/subdivide", content=part, headers=GLB)
-    alone = client.post("/subdivide", content=part, headers=GLB | {"Accept": "application/json"})
-    assert alone.headers["content-type"] == "application/json"
-    assert alone.json() == report_of(whole)
-
-
-def test_parameters_reach_the_operator(client: TestClient, part: bytes) -> None:
-    query = "/subdivide?scheme=pns&budget=0.25&reference_length=2.5&diagnostics=full"
-    answer = client.post(query, content=part, headers=GLB)
+def test_parameters_reach_the_operator(client):
+    answer = post(client, "scheme=pns&budget=0.25&reference_length=2.5&diagnostics=full")
     report = report_of(answer)
-    assert report["budget"] == 0.25
-    assert report["meshes"][0]["reference_length"] == 2.5
+    assert (report["budget"], report["meshes"][0]["reference_length"]) == (0.25, 2.5)
     attributes = tree_of(answer.content)["meshes"][0]["primitives"][0]["attributes"]
     assert {"_PNS_RATIO", "_PNS_GATE"} <= set(attributes)
-    loop = client.post("/subdivide?scheme=loop", content=part, headers=GLB)
-    assert report_of(loop)["scheme"] == "loop"
-    bare = client.post("/subdivide?diagnostics=none", content=part, headers=GLB)
-    assert "extras" not in tree_of(bare.content)["asset"]
+    assert report_of(post(client, "scheme=loop"))["scheme"] == "loop"
+    assert "extras" not in tree_of(post(client, "diagnostics=none").content)["asset"]
 
 
 @pytest.mark.parametrize("kind", ["obj", "ply", "stl", "off", "3mf"])
-def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(
-    client: TestClient, part: bytes, kind: str
-) -> None:
-    triangles = example_part()
-    content = formats.write(triangles, kind)
-    raw = client.post("/subdivide", content=content, headers={"Content-Type": f"model/{kind}"})
-    assert report_of(raw)["totals"]["faces"] == 16 * FACES
-    assert report_of(raw)["levels"][0]["edges"]["boundary"] == 0
+def test_other_mesh_formats_come_back_as_the_glb_that_their_glb_gives(client, kind):
+    content = formats.write(example_part(), kind)
+    raw = post(client, body=content, **{"Content-Type": f"model/{kind}"})
     form = client.post("/subdivide", files={"file": (f"part.{kind.upper()}", content)})
     assert form.content == raw.content
-    direct = report_of(client.post("/subdivide", content=part, headers=GLB))
-    mean_ratio = report_of(raw)["levels"][0]["proximity_ratio"]["mean"]
-    assert mean_ratio == pytest.approx(direct["levels"][0]["proximity_ratio"]["mean"], rel=1e-3)
+    found, direct = report_of(raw), report_of(post(client))
+    assert found["totals"]["faces"] == 16 * FACES
+    assert found["levels"][0]["edges"]["boundary"] == 0
+    means = [report["levels"][0]["proximity_ratio"]["mean"] for report in (found, direct)]
+    assert means[0] == pytest.approx(means[1], rel=1e-3)
 
 
-def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
+@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off", "3mf"])
+def test_an_answer_in_another_format_is_what_the_command_writes(client, target):
+    answer = post(client, f"levels=1&scheme=loop&format={target}")
+    written = converted(PART, "glb", target, Options(levels=1, scheme="loop"), None, Limits())
+    assert answer.content == written.content
+    assert answer.headers["content-type"] == MEDIA_TYPES[target]
+
+
+def test_what_a_conversion_loses_is_in_the_report(client):
     text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\ng red\nf 1 2 3 4\n"
     files = {"file": ("quad.obj", text), "quad.mtl": ("quad.mtl", b"newmtl red\n")}
     report = report_of(client.post("/subdivide", files=files))
@@ -160,43 +134,26 @@ def test_what_a_conversion_loses_is_in_the_report(client: TestClient) -> None:
     assert report["totals"]["faces"] == 16
 
 
-def test_a_model_given_to_the_application_is_the_one_that_runs(part: bytes) -> None:
+def test_a_model_given_to_the_application_runs_and_no_upload_is_logged(capfd):
     """And it crosses to each worker once."""
     before = CountedModel.pickled
+    # Its worker starts here, so that it writes to the stream that is captured.
     app = create_app(Settings(workers=1), model=CountedModel(), warm_up=hold_model)
     with local(app) as client:
-        for _ in range(3):
-            report = report_of(client.post("/subdivide", content=part, headers=GLB))
+        for _ in range(2):
+            report = report_of(post(client))
             assert report["model"] == "zero"
             assert report["levels"][0]["proximity_ratio"]["max"] == 0
+        kind = {"Content-Type": "multipart/form-data; boundary=b"}
+        assert post(client, body=b"--b\r\nNot a header: x", **kind).status_code == 400
     assert CountedModel.pickled == before + 1
-
-
-def test_what_an_upload_says_is_not_logged(capfd: pytest.CaptureFixture[str]) -> None:
-    kind = {"Content-Type": "multipart/form-data; boundary=b"}
-    # Its worker starts here, so that it writes to the stream that is captured.
-    with local(create_app(Settings(workers=1), warm_up=hold_model)) as client:
-        answer = client.post("/subdivide", content=b"--b\r\nNot a header: x", headers=kind)
-        assert answer.status_code == 400
     assert "header" not in capfd.readouterr().err
 
 
-def test_without_a_model_loop_still_works(part: bytes) -> None:
+def test_without_a_model_loop_still_works():
     settings = Settings(workers=1, model="missing.onnx")
     with local(create_app(settings, warm_up=hold_model)) as client:
-        refused = client.post("/subdivide", content=part, headers=GLB)
-        assert refused.status_code == 503
-        assert refused.json()["code"] == "no-model"
-        assert client.post("/subdivide?scheme=loop", content=part, headers=GLB).status_code == 200
+        refused = post(client)
+        assert (refused.status_code, refused.json()["code"]) == (503, "no-model")
+        assert post(client, "scheme=loop").status_code == 200
         assert client.get("/readyz").status_code == 503
-
-
-@pytest.mark.parametrize("target", ["gltf", "obj", "ply", "stl", "off", "3mf"])
-def test_an_answer_in_another_format_is_what_the_command_writes(
-    client: TestClient, target: Kind
-) -> None:
-    query = f"levels=1&scheme=loop&format={target}"
-    answer = client.post(f"/subdivide?{query}", content=part_glb(), headers=GLB)
-    written = converted(part_glb(), "glb", target, Options(levels=1, scheme="loop"), None, Limits())
-    assert answer.content == written.content
-    assert answer.headers["content-type"] == MEDIA_TYPES[target]

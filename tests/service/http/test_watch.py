@@ -38,26 +38,19 @@ def lines(caplog):
 # Request ids
 
 
-@pytest.mark.parametrize("sent", ["a", "7f3e-22.B_1", "x" * 64])
-def test_a_sane_request_id_is_kept(client, sent, caplog):
-    with caplog.at_level(logging.INFO):
-        answer = client.get("/nothing", headers={"X-Request-ID": sent})
-    assert answer.headers["x-request-id"] == sent
-    assert answer.json()["request_id"] == sent
-    assert lines(caplog)[0]["request_id"] == sent
+SANE = ["a", "7f3e-22.B_1", "x" * 64]
+OTHERS = [[], ["a", "b"], *([each] for each in ("", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "é"))]
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [[], ["a", "b"], *([each] for each in ("", "x" * 65, "-a", "a b", "a\x1b[31m", "{}", "é"))],
-)
-def test_any_other_is_replaced(client, sent):
+@pytest.mark.parametrize("sent", [*([each] for each in SANE), *OTHERS])
+def test_a_sane_request_id_is_kept_and_any_other_replaced(client, sent, caplog):
     headers = [(b"x-request-id", each.encode("latin-1")) for each in sent]
-    answer = client.get("/nothing", headers=headers)
+    with caplog.at_level(logging.INFO):
+        answer = client.get("/nothing", headers=headers)
     given_back = answer.headers["x-request-id"]
-    assert given_back not in sent
-    assert len(given_back) == 16
-    assert answer.json()["request_id"] == given_back
+    assert (given_back in sent) is (sent not in OTHERS)
+    assert sent not in OTHERS or len(given_back) == 16
+    assert answer.json()["request_id"] == lines(caplog)[0]["request_id"] == given_back
 
 
 def test_a_fault_of_the_server_is_a_problem_with_its_request_id_everywhere(client, caplog):
@@ -104,22 +97,15 @@ def test_no_text_ends_its_line_or_speaks_to_a_terminal(message, value):
     line = JsonLines().format(record(message.replace("%", ""), value=value))
     assert all(" " <= character <= "~" for character in line)
     assert json.loads(line)["value"] == value[: len(value)]
-
-
-def test_a_terminal_is_shown_no_control_characters():
-    line = TerminalLines().format(record("in\x1b[2Jside\n", value="a\x7f\x9b\n"))
+    line = TerminalLines().format(record(message.replace("%", ""), value=value))
     assert all(" " <= character <= "~" for character in line)
-    assert re.fullmatch(r"\d\d:\d\d:\d\dZ info: in.*side.* value=.*", line)
+    assert re.match(r"\d\d:\d\d:\d\dZ info: .* value=", line)
 
 
-def test_a_long_text_is_cut_in_its_middle():
+def test_a_long_text_is_cut_in_its_middle_and_a_traceback_is_one_line():
     line = json.loads(JsonLines().format(record("a" * 10**6 + "z", value="b" * 10**6)))
     assert len(line["message"]) == len(line["value"]) == LONGEST + 1
-    assert line["message"].startswith("aaa")
-    assert line["message"].endswith("az")
-
-
-def test_a_traceback_is_one_line():
+    assert (line["message"][:3], line["message"][-2:]) == ("aaa", "az")
     made = record("failed")
     try:
         int("line\nend")
@@ -168,7 +154,13 @@ def test_requests_are_counted_by_route_status_and_code(client):
     client.post("/subdivide", content=b"x", headers=GLB | {"Host": "another"})
     client.get("/assets/of-somebody", headers={"Host": "another"})
     client.post("/report", content=b"x", headers=GLB | {"Content-Length": str(2**40)})
+    for n in range(20):
+        client.request(f"M{n}", f"/made-up-{n}")
     values = scraped(client)
+    # A stranger cannot make series.
+    labels = [dict(each) for _, each in values]
+    assert not any("made-up" in each.get("route", "") for each in labels)
+    assert not any(each.get("method", "").startswith("M") for each in labels)
     for route, method, status, code in (
         ("/subdivide", "POST", "200", ""),
         ("/subdivide", "POST", "400", "unreadable"),
@@ -183,16 +175,6 @@ def test_requests_are_counted_by_route_status_and_code(client):
     assert labelled(values, "pns_request_seconds_count", route="/subdivide") >= 2
     assert labelled(values, "pns_received_bytes_total", route="/subdivide") >= 14
     assert labelled(values, "process_open_fds") > 0
-
-
-def test_a_stranger_cannot_make_series(client):
-    for n in range(20):
-        client.request(f"M{n}", f"/made-up-{n}")
-    values = scraped(client)
-    routes = {dict(labels).get("route") for _, labels in values}
-    methods = {dict(labels).get("method") for _, labels in values}
-    assert not any("made-up" in (route or "") for route in routes)
-    assert not any((method or "").startswith("M") for method in methods)
 
 
 def test_jobs_faces_models_and_restarts_are_served_on_a_port_of_their_own():

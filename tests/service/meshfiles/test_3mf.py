@@ -1,7 +1,5 @@
 """3MF: parts of a print go in and come out with their colours, names, places and unit."""
 
-from __future__ import annotations
-
 import ctypes
 import io
 import zipfile
@@ -34,10 +32,9 @@ MESH = (
     + "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES)
     + "</triangles></mesh>"
 )
-WRONG = MESH.replace('v1="1"', 'v1="4"')
 
 
-def package(model: str, relations: str = RELATIONS, **more: str) -> bytes:
+def package(model, relations=RELATIONS, **more):
     """A package of one model, and other parts by name."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
@@ -48,14 +45,14 @@ def package(model: str, relations: str = RELATIONS, **more: str) -> bytes:
     return file.getvalue()
 
 
-def model(resources: str, items: str = '<item objectid="1"/>', head: str = "") -> str:
+def model(resources, items='<item objectid="1"/>', head=""):
     return (
         f'<model xmlns="{CORE}" xmlns:p="{PRODUCTION}" {head}><resources>{resources}</resources>'
         f"<build>{items}</build></model>"
     )
 
 
-def opened(data: bytes) -> lib3mf.Model:
+def opened(data):
     """Return a model as the consortium's own library reads it, to its letter."""
     read = lib3mf.get_wrapper().CreateModel()
     reader = read.QueryReader("3mf")
@@ -65,18 +62,18 @@ def opened(data: bytes) -> lib3mf.Model:
     return read
 
 
-def items_of(read: lib3mf.Model) -> list:
+def items_of(read):
     items, iterator = [], read.GetBuildItems()
     while iterator.MoveNext():
         items.append(iterator.GetCurrent())
     return items
 
 
-def mesh_of(read: lib3mf.Model, item: object) -> object:
+def mesh_of(read, item):
     return read.GetMeshObjectByID(item.GetObjectResourceID())
 
 
-def print_of_two() -> bytes:
+def print_of_two():
     """Two tetrahedra, by the consortium's library: one of two materials, one of blended colours."""
     made = lib3mf.get_wrapper().CreateModel()
     made.SetUnit(lib3mf.ModelUnit.Inch)
@@ -105,7 +102,7 @@ def print_of_two() -> bytes:
     return bytes(made.QueryWriter("3mf").WriteToBuffer())
 
 
-def test_parts_colours_materials_and_unit_of_another_writer_are_read() -> None:
+def test_parts_colours_materials_and_unit_of_another_writer_are_read():
     mesh = formats.read(print_of_two(), "3mf")
     assert mesh.unit == "inch"
     assert mesh.changes == ()
@@ -125,7 +122,7 @@ def test_parts_colours_materials_and_unit_of_another_writer_are_read() -> None:
     assert shown[4:, :, 1].tolist() == (60 * FACES).tolist()
 
 
-def test_another_reader_finds_what_was_refined() -> None:
+def test_another_reader_finds_what_was_refined():
     written = converted(
         print_of_two(), "3mf", "3mf", Options(levels=1, scheme="loop"), None, Limits()
     )
@@ -147,7 +144,7 @@ def test_another_reader_finds_what_was_refined() -> None:
     assert sorted(green) == [30, 60, 90]
 
 
-def test_components_are_placed_and_mirrors_keep_the_outside_outside() -> None:
+def test_components_are_placed_and_mirrors_keep_the_outside_outside():
     inner = f'<object id="7">{MESH}</object>'
     outer = (
         '<object id="1"><components>'
@@ -165,7 +162,7 @@ def test_components_are_placed_and_mirrors_keep_the_outside_outside() -> None:
     np.testing.assert_allclose(volumes, 8 * 1000 / 6)
 
 
-def test_parts_in_other_models_of_the_package_are_found() -> None:
+def test_parts_in_other_models_of_the_package_are_found():
     part_of = '<component p:path="/3D/Objects/b.model" objectid="4"/>'
     main = model(f'<object id="1"><components>{part_of}</components></object>')
     other = model(f'<object id="4" name="lid">{MESH}</object>', "")
@@ -177,7 +174,7 @@ def test_parts_in_other_models_of_the_package_are_found() -> None:
     ]
 
 
-def test_a_glb_has_metres_and_stands_upright_and_so_does_what_comes_back() -> None:
+def test_a_glb_has_metres_and_stands_upright_and_so_does_what_comes_back():
     options = Options(levels=1, scheme="loop")
     data = package(model(f'<object id="1">{MESH}</object>', head='unit="centimeter"'))
     glb = converted(data, "3mf", "glb", options, None, Limits()).content
@@ -194,7 +191,7 @@ def test_a_glb_has_metres_and_stands_upright_and_so_does_what_comes_back() -> No
     assert mesh.vertices.max() > 0.02
 
 
-def test_materials_of_a_glb_become_materials_of_their_colour() -> None:
+def test_materials_of_a_glb_become_materials_of_their_colour():
     tree = converted(
         formats.write(part(), "obj"), "obj", "glb", Options(levels=1, scheme="loop"), None, Limits()
     ).content
@@ -208,7 +205,7 @@ def test_materials_of_a_glb_become_materials_of_their_colour() -> None:
     assert all(colour.Alpha == 255 for colour in colours)
 
 
-def test_what_a_format_cannot_say_is_told() -> None:
+def test_what_a_format_cannot_say_is_told():
     options = Options(levels=1, scheme="loop")
     written = converted(print_of_two(), "3mf", "stl", options, None, Limits())
     told = {change["what"].partition(" dropped")[0] for change in written.report["changes"]}
@@ -227,52 +224,53 @@ def test_what_a_format_cannot_say_is_told() -> None:
     ]
 
 
-def test_a_file_has_the_same_bytes_each_time() -> None:
+def test_a_file_has_the_same_bytes_each_time():
     mesh = formats.read(print_of_two(), "3mf")
     assert formats.write(mesh, "3mf") == formats.write(mesh, "3mf")
     again = formats.read(formats.write(mesh, "3mf"), "3mf")
     assert formats.write(again, "3mf") == formats.write(mesh, "3mf")
 
 
-SELF = '<object id="1"><components><component objectid="1"/></components></object>'
-MANY = "".join(
-    f'<object id="{k}"><components>{f"<component objectid={chr(34)}{k + 1}{chr(34)}/>" * 2}'
-    "</components></object>"
-    for k in range(1, 40)
-)
+def of_parts(number, part, count):
+    """An object of so many copies of another one."""
+    parts = f'<component objectid="{part}"/>' * count
+    return f'<object id="{number}"><components>{parts}</components></object>'
+
+
+def printed(mesh, items='<item objectid="1"/>', head=""):
+    return package(model(f'<object id="1">{mesh}</object>', items, head))
+
+
+NO_PART = '<item objectid="1" p:path="/3D/z.model"/>'
+CIPHER = 'requiredextensions="q" xmlns:q="http://cipher"'
 REFUSED = [
     (b"PK\x03\x04", "the archive cannot be read"),
     (package(model(""), relations="<Relationships/>"), "names no 3D model"),
     (package("<model"), "3D/a.model of the 3MF file is no XML"),
     (package(f'<!DOCTYPE x [<!ENTITY a "b">]>{model("")}'), "line 1 of 3D/a.model.*no DTD"),
     (package(model("")), "has no object 1 in 3D/a.model"),
-    (package(model('<object id="1"/>')), "prints no triangles"),
-    (package(model(f'<object id="1">{MESH.replace("z=", "w=", 1)}</object>')), "'z' is missing"),
-    (package(model(f'<object id="1">{MESH.replace("10.0", "ten", 1)}</object>')), "'ten'"),
+    (printed(""), "prints no triangles"),
+    (printed(MESH.replace("z=", "w=", 1)), "'z' is missing"),
+    (printed(MESH.replace("10.0", "ten", 1)), "'ten'"),
     (
-        package(model(f'<object id="1">{WRONG}</object>')),
+        printed(MESH.replace('v1="1"', 'v1="4"')),
         "triangle 3 of object 1 in 3D/a.model names vertices 4, 2, 3, expected 0 … 3",
     ),
-    (
-        package(model(f'<object id="1">{MESH}</object>', '<item objectid="1" transform="1 0"/>')),
-        "a transform has twelve numbers",
-    ),
-    (package(model(SELF)), "object 1 of the 3MF file is a part of itself"),
-    (
-        package(model("", head='requiredextensions="q" xmlns:q="http://cipher"')),
-        "it needs the extension http://cipher",
-    ),
+    (printed(MESH, '<item objectid="1" transform="1 0"/>'), "a transform has twelve numbers"),
+    (package(model(of_parts(1, 1, 1))), "object 1 of the 3MF file is a part of itself"),
+    (package(model("", head=CIPHER)), "it needs the extension http://cipher"),
     (package(model("", head='unit="parsec"')), "unit 'parsec' must be one of micron, milli"),
-    (package(model('<object id="1"/>', '<item objectid="1" p:path="/3D/z.model"/>')), "no part 3D"),
+    (printed("", NO_PART), "no part 3D"),
 ]
 
 
 @pytest.mark.parametrize(("data", "text"), REFUSED)
-def test_what_is_no_print_is_refused_with_its_place(data: bytes, text: str) -> None:
+def test_what_is_no_print_is_refused_with_its_place(data, text):
     with pytest.raises(ServiceError, match=text):
         formats.read(data, "3mf")
 
 
-def test_copies_of_copies_are_counted_before_they_are_made() -> None:
+def test_copies_of_copies_are_counted_before_they_are_made():
+    many = "".join(of_parts(number, number + 1, 2) for number in range(1, 40))
     with pytest.raises(LimitError, match="too many"):
-        formats.read(package(model(MANY + f'<object id="40">{MESH}</object>')), "3mf")
+        formats.read(package(model(f'{many}<object id="40">{MESH}</object>')), "3mf")

@@ -1,7 +1,5 @@
 """The example part: a closed surface that subdivision has something to do on."""
 
-from __future__ import annotations
-
 import io
 
 import trimesh
@@ -11,7 +9,7 @@ from service.meshes.weld import weld
 from service.meshfiles.example import part, part_glb
 
 
-def test_a_closed_manifold_of_genus_one_facing_outwards() -> None:
+def test_a_closed_manifold_of_genus_one_facing_outwards():
     triangles = part()
     welded = weld(triangles.vertices, triangles.faces)
     topology = build_topology(welded.faces, len(welded.points))
@@ -21,7 +19,7 @@ def test_a_closed_manifold_of_genus_one_facing_outwards() -> None:
     assert trimesh.Trimesh(welded.points, welded.faces, process=False).volume > 0
 
 
-def test_the_file_is_the_same_each_time_and_has_normals_uvs_and_a_material() -> None:
+def test_the_file_is_the_same_each_time_and_has_normals_uvs_and_a_material():
     data = part_glb()
     assert data == part_glb()
     mesh = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False).to_mesh()

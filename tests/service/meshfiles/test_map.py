@@ -1,10 +1,5 @@
 """A map makes the refined positions of those of the file, where the operator is linear."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, load_npz
@@ -18,7 +13,7 @@ from tests.support.gltf.shapes import box, octahedron
 from tests.support.shared import shared_path
 
 
-def mapped(source: Path, target: str, **options: Any) -> tuple[bytes, Path]:
+def mapped(source, target, **options):
     """Refine a file; return the result, and the file of the map."""
     output, parents = source.parent / f"out.{target}", source.parent / "map.npz"
     asked = Options(**({"scheme": "loop", "levels": 2} | options))
@@ -30,9 +25,7 @@ def mapped(source: Path, target: str, **options: Any) -> tuple[bytes, Path]:
 @pytest.mark.parametrize("target", ["obj", "ply", "off", "stl", "3mf"])
 @pytest.mark.parametrize("material", [None, "m1"])
 @pytest.mark.parametrize("scheme", ["loop", "catmull-clark"])
-def test_a_map_of_one_matrix_makes_the_positions(
-    target: str, material: str | None, scheme: str, tmp_path: Path
-) -> None:
+def test_a_map_of_one_matrix_makes_the_positions(target, material, scheme, tmp_path):
     data = (shared_path("cases") / "obj_two_materials.obj").read_bytes()
     (tmp_path / "in.obj").write_bytes(data)
     made, parents = mapped(tmp_path / "in.obj", target, material=material, scheme=scheme)
@@ -40,7 +33,7 @@ def test_a_map_of_one_matrix_makes_the_positions(
     np.testing.assert_allclose(again, formats.read(made, target).vertices, atol=1e-6)
 
 
-def assert_map_of_gltf(data: bytes, made: bytes, parents: Path) -> int:
+def assert_map_of_gltf(data, made, parents):
     """Check every primitive of the result by its matrix; return how many there are."""
     tree, binary = files.unpack(data)
     arrays, checked = np.load(parents), 0
@@ -65,7 +58,7 @@ def assert_map_of_gltf(data: bytes, made: bytes, parents: Path) -> int:
     return checked
 
 
-def halves(**others: Any) -> list[dict[str, Any]]:
+def halves(**others):
     """An octahedron in two primitives with seams between them, lines among them."""
     whole = octahedron()
     points, faces = whole["POSITION"], whole["indices"]
@@ -78,33 +71,26 @@ def halves(**others: Any) -> list[dict[str, Any]]:
 @pytest.mark.parametrize(
     "options",
     [
-        {},
-        {"normals": "keep", "levels": 1},
-        {"weld": "off"},
-        {"compress": "meshopt"},
+        *({}, {"normals": "keep", "levels": 1}, {"weld": "off"}, {"compress": "meshopt"}),
         {"scheme": "pns", "budget": 0.0},
         {"scheme": "catmull-clark", "polygons": "auto"},
     ],
 )
-def test_each_primitive_of_a_gltf_has_a_matrix_over_its_mesh(
-    options: dict[str, Any], tmp_path: Path
-) -> None:
+def test_each_primitive_of_a_gltf_has_a_matrix_over_its_mesh(options, tmp_path):
     flat = {"POSITION": np.zeros((3, 3)), "indices": np.array([[0, 0, 1]])}
     tree, binary = files.document(halves(), [box()], [flat], [octahedron()])
     # The geometry of another mesh, which is refined once.
     tree["meshes"].append(tree["meshes"][0])
     data = files.pack(tree, bytes(binary))
     (tmp_path / "in.glb").write_bytes(data)
-    if options.get("compress") == "meshopt":
-        _, parents = mapped(tmp_path / "in.glb", "glb", **options)
+    made, parents = mapped(tmp_path / "in.glb", "glb", **options)
+    if "compress" in options:
         made, _ = mapped(tmp_path / "in.glb", "glb")
-    else:
-        made, parents = mapped(tmp_path / "in.glb", "glb", **options)
     assert assert_map_of_gltf(data, made, parents) == 6
 
 
 @pytest.mark.parametrize("name", ["Fox", "MorphStressTest", "barrel_large_decorated", "cow"])
-def test_maps_of_assets_make_their_positions(name: str, tmp_path: Path) -> None:
+def test_maps_of_assets_make_their_positions(name, tmp_path):
     data = (shared_path("assets") / f"{name}.glb").read_bytes()
     (tmp_path / "in.glb").write_bytes(data)
     made, parents = mapped(tmp_path / "in.glb", "glb", levels=1)
@@ -114,9 +100,7 @@ def test_maps_of_assets_make_their_positions(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("output", "options"), [("out.obj", {}), ("out.glb", {"compress": "draco"})]
 )
-def test_what_numbers_vertices_anew_has_no_map(
-    output: str, options: dict[str, Any], tmp_path: Path
-) -> None:
+def test_what_numbers_vertices_anew_has_no_map(output, options, tmp_path):
     (tmp_path / "in.glb").write_bytes(files.glb([box()]))
     jobs = Jobs([tmp_path / "in.glb"], tmp_path / output, map=tmp_path / "map.npz")
     with pytest.raises(InvalidParameter, match="map"):

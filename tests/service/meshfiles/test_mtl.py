@@ -1,9 +1,5 @@
 """Materials of an OBJ become those of a GLB, with their textures in it."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import pytest
 
 from service.bodies.sibling_files import ALONE, File, Opened, SiblingFiles
@@ -39,23 +35,21 @@ Ke 0 0.5 0
 """
 
 
-def beside(**named: bytes) -> SiblingFiles:
+def beside(**named):
     there = {"my scene.mtl": MTL, "tex/wall 1.png": PNG} | named
     return SiblingFiles(
         lambda name: File(name, there[name]) if name in there else None, frozenset(there)
     )
 
 
-def tree_of(
-    siblings: SiblingFiles, target: str = "glb", obj: bytes = OBJ
-) -> tuple[Any, dict[str, int]]:
+def tree_of(siblings, target="glb", obj=OBJ):
     options = Options(scheme="loop")
     made = converted(obj, "obj", target, options, None, Limits(), siblings=siblings)
     told = {change["what"]: change["count"] for change in made.report["changes"]}
     return (files.unpack(made.content)[0] if target == "glb" else made.content), told
 
 
-def test_each_material_is_a_primitive_with_what_its_library_says() -> None:
+def test_each_material_is_a_primitive_with_what_its_library_says():
     tree, told = tree_of(beside())
     glass, wall = tree["materials"]
     assert (glass["name"], wall["name"]) == ("glass", "brick wall")
@@ -72,7 +66,7 @@ def test_each_material_is_a_primitive_with_what_its_library_says() -> None:
     assert told == {"embedded": 1}
 
 
-def test_names_may_be_quoted_and_comments_may_stand_behind_them() -> None:
+def test_names_may_be_quoted_and_comments_may_stand_behind_them():
     mtl = MTL.replace(b"tex\\wall 1.png", b'"tex\\wall 1.png" # of bricks')
     mtl = mtl.replace(b"newmtl glass", b"newmtl glass # thin")
     siblings = beside(**{"my scene.mtl": mtl})
@@ -86,20 +80,20 @@ def test_names_may_be_quoted_and_comments_may_stand_behind_them() -> None:
         assert len(tree["images"]) == 1
 
 
-def test_a_library_that_did_not_come_is_reported_and_names_stay() -> None:
+def test_a_library_that_did_not_come_is_reported_and_names_stay():
     tree, told = tree_of(ALONE)
     assert [material["name"] for material in tree["materials"]] == ["glass", "brick wall"]
     assert told == {"materials not found: no my scene.mtl came with the file": 1}
 
 
-def test_an_obj_keeps_its_names_and_its_library() -> None:
+def test_an_obj_keeps_its_names_and_its_library():
     text, told = tree_of(beside(), "obj")
     assert text.startswith(b"mtllib my scene.mtl\n")
     assert text.count(b"usemtl glass\n") == text.count(b"usemtl brick wall\n") == 1
     assert told == {}
 
 
-def test_the_files_that_an_obj_leads_to_are_named() -> None:
+def test_the_files_that_an_obj_leads_to_are_named():
     siblings = beside(**{"my scene.mtl": MTL + b"map_Bump tex/wall 1.png\nrefl no.png\n"})
     named = companions(OBJ, "obj", Opened(siblings))
     assert [file.name for file in named] == ["my scene.mtl", "tex/wall 1.png"]
@@ -119,7 +113,7 @@ def test_the_files_that_an_obj_leads_to_are_named() -> None:
         ("my.mtl", "a%20b.png", "a b.png"),
     ],
 )
-def test_textures_are_found_wherever_they_came_to_lie(library: str, image: str, lies: str) -> None:
+def test_textures_are_found_wherever_they_came_to_lie(library, image, lies):
     place = library.replace("\\", "/").removeprefix("D:/")
     there = {place: MTL.replace(b"tex\\wall 1.png", image.encode()), lies: PNG}
     siblings = SiblingFiles(lambda name: File(name, there[name]) if name in there else None)
@@ -133,7 +127,7 @@ def test_textures_are_found_wherever_they_came_to_lie(library: str, image: str, 
     assert {file.name for file in companions(obj, "obj", Opened(siblings))} == {place, lies}
 
 
-def test_a_texture_of_another_machine_that_did_not_come_is_told() -> None:
+def test_a_texture_of_another_machine_that_did_not_come_is_told():
     mtl = MTL.replace(b"tex\\wall 1.png", b"C:\\work\\wall 1.png")
     siblings = beside(**{"my scene.mtl": mtl + b"map_d leaf.png\n"})
     tree, told = tree_of(siblings)
@@ -146,7 +140,7 @@ def test_a_texture_of_another_machine_that_did_not_come_is_told() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "gbk"])
-def test_names_are_written_in_the_bytes_that_were_read(encoding: str) -> None:
+def test_names_are_written_in_the_bytes_that_were_read(encoding):
     name = "墙".encode(encoding) if encoding == "gbk" else "façade".encode(encoding)
     obj = OBJ.replace(b"brick wall", name).replace(
         b"usemtl glass", b"g " + name + b"\nusemtl glass"
@@ -159,7 +153,7 @@ def test_names_are_written_in_the_bytes_that_were_read(encoding: str) -> None:
     assert "baseColorTexture" in tree["materials"][1]["pbrMetallicRoughness"]
 
 
-def test_smoothing_groups_are_hard_edges_and_stay_in_an_obj() -> None:
+def test_smoothing_groups_are_hard_edges_and_stay_in_an_obj():
     roof = b"v 0 0 0\nv 0 4 0\nv 2 0 1\nv 2 4 1\nv -2 0 1\nv -2 4 1\n"
     roof += b"s 1\nf 1 3 4\nf 1 4 2\ns 2\nf 1 2 6\nf 1 6 5\n"
     options = Options(scheme="loop", crease="normals")

@@ -142,7 +142,7 @@ def test_a_model_that_polygons_leave_out_is_named(target: str) -> None:
     def advice(scheme: Any, model: str) -> str:
         options = Options(levels=1, scheme=scheme)
         made = converted(cube(), "obj", target, options, load_model(model), Limits())
-        return "\n".join(made.report["advice"])
+        return "\n".join(each["text"] for each in made.report["advice"])
 
     assert "model paper has no rules for polygons" in advice("auto", "paper")
     assert "scheme=pns" in advice("auto", "paper")
@@ -258,7 +258,12 @@ def test_faces_that_are_none_are_dropped_and_reported() -> None:
     text = cube() + b"v 0 0 9\nf 1 1 2 2\nf 1 2 2 3 9\nf 4 5 6\n"
     report = made(text, "obj", "obj").report
     assert report["dropped"]["degenerate_faces"] == 1
-    assert {"pointer": "", "what": "repeated corners dropped", "count": 1} in report["changes"]
+    assert {
+        "pointer": "",
+        "code": "repeated-corners",
+        "what": "repeated corners dropped",
+        "count": 1,
+    } in report["changes"]
     by_index = made(text, "obj", "obj", weld="index").report
     assert by_index["totals"]["faces"] == report["totals"]["faces"] == 24 + 4 + 3
 

@@ -1,7 +1,5 @@
 """Double positions: what OBJ, PLY and OFF hold is not rounded, and where it must be, it is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -10,14 +8,14 @@ from pns_common.operator.scheme import loop
 from pns_common.refinement import refine
 from service.meshfiles import formats
 from service.meshfiles.formats import rounding_changes
-from service.meshfiles.mesh_file import MeshFile, of_triangles
+from service.meshfiles.mesh_file import of_triangles
 from service.meshfiles.refine_mesh_file import refine_mesh_file
 from service.options import Limits, Options
 
 SIDE = 12
 
 
-def grid(*, spacing: float, offset: float) -> MeshFile:
+def grid(*, spacing, offset):
     """A square of SIDE × SIDE vertices, so far along x."""
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
     points = np.column_stack([offset + spacing * x.ravel(), spacing * y.ravel(), 0 * x.ravel()])
@@ -38,7 +36,7 @@ end_header
 """
 
 
-def double_ply(triangles: MeshFile) -> bytes:
+def double_ply(triangles):
     head = PLY_HEAD.format(vertices=len(triangles.vertices), faces=len(triangles.faces))
     rows = [" ".join(map(repr, row)) for row in triangles.vertices.tolist()]
     rows += ["3 " + " ".join(map(str, row)) for row in triangles.faces.tolist()]
@@ -47,9 +45,7 @@ def double_ply(triangles: MeshFile) -> bytes:
 
 @pytest.mark.parametrize("kind", ["obj", "off", "ply"])
 @pytest.mark.parametrize(("spacing", "offset"), [(0.1, 4.5e6), (1e-46, 0.0), (1e40, 1e41)])
-def test_coordinates_beyond_float32_keep_every_face(
-    kind: str, spacing: float, offset: float
-) -> None:
+def test_coordinates_beyond_float32_keep_every_face(kind, spacing, offset):
     triangles = grid(spacing=spacing, offset=offset)
     data = double_ply(triangles) if kind == "ply" else formats.write(triangles, kind)
     read = formats.read(data, kind)
@@ -61,7 +57,7 @@ def test_coordinates_beyond_float32_keep_every_face(
 
 
 @pytest.mark.parametrize(("offset", "told"), [(4.5e6, True), (4e5, True), (1e4, False), (0, False)])
-def test_faces_of_few_steps_of_float32_are_counted(offset: float, told: bool) -> None:
+def test_faces_of_few_steps_of_float32_are_counted(offset, told):
     """Of a map in metres, which rounding turns by some tenths of a degree."""
     triangles = grid(spacing=1.1, offset=offset)
     triangles.vertices[:, 2] = triangles.vertices[:, 0] - offset
@@ -70,7 +66,7 @@ def test_faces_of_few_steps_of_float32_are_counted(offset: float, told: bool) ->
     assert (turned_by_rounding(triangles) > 0.1) == told
 
 
-def turned_by_rounding(triangles: MeshFile) -> float:
+def turned_by_rounding(triangles):
     """Return the degrees by which rounding to float32 turns the face that it turns most."""
     exact, rounded = (
         np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])

@@ -1,7 +1,5 @@
 """Refusals of mesh files name the place, in the words of the file."""
 
-from __future__ import annotations
-
 import pytest
 
 from pns_common.operator.scheme import loop
@@ -17,7 +15,7 @@ PLY = ply("")
 PYTHONS = {"islice", "inhomogeneous", "int", "charset", "array", "Traceback"}
 
 # What a file holds, and what is said of it.
-WRONG: list[tuple[str, str | bytes, str]] = [
+WRONG = [
     ("obj", OBJ + "f 0 1 2\n", "line 7 of the OBJ file: a face names vertex 0"),
     ("obj", OBJ + "\nf 1 2 7\n", "line 8 .* vertex 7, and there are 6"),
     ("obj", "v 0 0 0\nf 1 -2 1\n" + OBJ, "line 2 .* vertex -2, and there are 1"),
@@ -66,7 +64,7 @@ WRONG: list[tuple[str, str | bytes, str]] = [
 
 
 @pytest.mark.parametrize(("kind", "content", "says"), WRONG)
-def test_what_is_wrong_is_said_with_its_place(kind: str, content: str | bytes, says: str) -> None:
+def test_what_is_wrong_is_said_with_its_place(kind, content, says):
     data = content.encode() if isinstance(content, str) else content
     with pytest.raises(ServiceError, match=says) as refusal:
         formats.read(data, kind)
@@ -74,7 +72,7 @@ def test_what_is_wrong_is_said_with_its_place(kind: str, content: str | bytes, s
     assert not PYTHONS & set(refusal.value.detail.split())
 
 
-def test_a_face_of_coincident_vertices_alone_makes_no_mesh() -> None:
+def test_a_face_of_coincident_vertices_alone_makes_no_mesh():
     mesh = formats.read(b"OFF\n3 1 0\n0 0 0\n0 0 0\n0 1 0\n3 0 1 2\n", "off")
     with pytest.raises(UnrefinableError):
         refine_mesh_file(mesh, loop(), Options(scheme="loop"), Limits())

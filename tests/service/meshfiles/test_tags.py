@@ -1,7 +1,5 @@
 """OpenSubdiv's tags in an OBJ: creases, corners and borders are those of OpenSubdiv."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,20 +13,20 @@ from tests.support.polygons import SHAPES, uneven
 CUBE, OPEN = "cube", "open box"
 
 
-def text_of(points: np.ndarray, faces: list, tags: str) -> bytes:
+def text_of(points, faces, tags):
     lines = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in points]
     lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
     return "\n".join([*lines, *(line.strip() for line in tags.splitlines())]).encode()
 
 
-def shape(name: str, *, triangles: bool) -> tuple[np.ndarray, list]:
+def shape(name, *, triangles):
     points, faces = SHAPES[name]
     if triangles:
         faces = [[f[0], f[k], f[k + 1]] for f in faces for k in range(1, len(f) - 1)]
     return np.round(uneven(points), 6), [list(face) for face in faces]
 
 
-def corners_of(data: bytes, levels: int, **options: object) -> np.ndarray:
+def corners_of(data, levels, **options):
     chosen = Options(**{"levels": levels, "limit": False, **options})
     made = read_obj(converted(data, "obj", "obj", chosen, None, Limits()).content)
     return made.vertices[made.corners].reshape(len(made.sizes), -1, 3)
@@ -36,7 +34,7 @@ def corners_of(data: bytes, levels: int, **options: object) -> np.ndarray:
 
 @pytest.mark.parametrize("triangles", [False, True])
 @pytest.mark.parametrize("sharpness", [0.5, 1, 2.25, 10])
-def test_creases_and_corners_are_opensubdivs(triangles: bool, sharpness: float) -> None:
+def test_creases_and_corners_are_opensubdivs(triangles, sharpness):
     points, faces = shape(CUBE, triangles=triangles)
     tags = f"""t crease 3/1/0 0 1 5 {sharpness}
         t crease 3/2/0 1 3 2 {sharpness} {sharpness}
@@ -51,7 +49,7 @@ def test_creases_and_corners_are_opensubdivs(triangles: bool, sharpness: float) 
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10)
 
 
-def test_borders_are_those_that_are_stated() -> None:
+def test_borders_are_those_that_are_stated():
     points, faces = shape(OPEN, triangles=False)
     for number, border in ((1, "corners"), (2, "smooth")):
         stated = text_of(points, faces, f"t interpolateboundary 1/0/0 {number}")
@@ -64,7 +62,7 @@ def test_borders_are_those_that_are_stated() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["catmull-clark", "loop"])
-def test_other_choices_of_creases_hold_in_place_of_tags(scheme: str) -> None:
+def test_other_choices_of_creases_hold_in_place_of_tags(scheme):
     points, faces = shape(CUBE, triangles=False)
     tagged, bare = (text_of(points, faces, tags) for tags in ("t crease 2/1/0 0 1 9\n", ""))
     for crease in ("off", "angle:30"):
@@ -73,7 +71,7 @@ def test_other_choices_of_creases_hold_in_place_of_tags(scheme: str) -> None:
     assert (corners_of(tagged, 1, scheme=scheme) != corners_of(bare, 1, scheme=scheme)).any()
 
 
-def test_tags_that_say_nothing_of_the_mesh_are_passed_over_or_told() -> None:
+def test_tags_that_say_nothing_of_the_mesh_are_passed_over_or_told():
     points, faces = shape(CUBE, triangles=False)
     tags = """t crease 2/1/0 0 7 3
         t crease 2/1/0 0 99 3
@@ -93,7 +91,7 @@ def test_tags_that_say_nothing_of_the_mesh_are_passed_over_or_told() -> None:
     assert (ours == corners_of(text_of(points, faces, ""), 1, scheme="catmull-clark")).all()
 
 
-def test_with_a_model_tags_stand_beside_the_edges_that_it_finds() -> None:
+def test_with_a_model_tags_stand_beside_the_edges_that_it_finds():
     points, faces = shape(CUBE, triangles=False)
     tags = "t crease 2/1/0 0 1 9"
     bare, marked = (

@@ -22,7 +22,7 @@ def here(tasks):
     return ([run(task)] for task in tasks)
 
 
-def library(folder: Path, names=("a.obj", "b/c.obj", "d.glb")) -> Path:
+def library(folder, names=("a.obj", "b/c.obj", "d.glb")):
     for name in names:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

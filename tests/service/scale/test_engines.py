@@ -29,6 +29,18 @@ def never(task, error):
     raise AssertionError(task, error)
 
 
+def blamed(task, _):
+    return task.number, -task.attempt
+
+
+def all_done(engine, given):
+    return [result for results in engine(iter(given)) for result in results]
+
+
+# Of six tasks in one chunk, whose fourth is to blame.
+ALL_BUT_ONE = [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+
+
 def test_a_worker_that_is_killed_between_two_tasks_costs_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "MOST", 1)
     processes, killed = [], []
@@ -66,16 +78,15 @@ def test_ctrl_c_is_the_driver_s_alone(tmp_path):
 
 def test_of_a_chunk_whose_worker_dies_the_task_it_was_at_is_to_blame(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "FIRST", 6)
-    all_tasks = tasks(tmp_path, 6)
-    work = Work(third_dies, lambda task, _: (task.number, -task.attempt), None)
-    done = [result for results in local.local(work, 1)(iter(all_tasks)) for result in results]
-    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
-    assert [len(task.processes) for task in all_tasks[3:]] == [2, 1, 1]
+    given = tasks(tmp_path, 6)
+    done = all_done(local.local(Work(third_dies, blamed, None), 1), given)
+    assert sorted(done) == ALL_BUT_ONE
+    assert [len(task.processes) for task in given[3:]] == [2, 1, 1]
 
 
 def test_a_fault_of_a_task_is_raised_as_it_was(tmp_path):
     with pytest.raises(ZeroDivisionError):
-        list(local.local(Work(divides_by_zero, never, None), 1)(iter(tasks(tmp_path, 1))))
+        all_done(local.local(Work(divides_by_zero, never, None), 1), tasks(tmp_path, 1))
 
 
 class TaskError(RuntimeError):
@@ -121,10 +132,8 @@ def test_of_a_chunk_that_a_cluster_loses_each_task_goes_alone(tmp_path, monkeypa
 
     monkeypatch.setitem(sys.modules, "ray", Cluster())
     monkeypatch.setattr(chunks, "FIRST", 6)
-    work = Work(third_is_lost, lambda task, _: (task.number, -task.attempt), None)
-    engine = on_ray.on_ray(work, None, 1)
-    done = [result for results in engine(iter(tasks(tmp_path, 6))) for result in results]
-    assert sorted(done) == [(0, 1), (1, 1), (2, 1), (3, -2), (4, 1), (5, 1)]
+    engine = on_ray.on_ray(Work(third_is_lost, blamed, None), None, 1)
+    assert sorted(all_done(engine, tasks(tmp_path, 6))) == ALL_BUT_ONE
 
 
 def test_a_fault_of_a_task_on_a_cluster_is_raised_as_it_was(tmp_path, monkeypatch):
@@ -134,7 +143,7 @@ def test_a_fault_of_a_task_on_a_cluster_is_raised_as_it_was(tmp_path, monkeypatc
     monkeypatch.setitem(sys.modules, "ray", Cluster())
     engine = on_ray.on_ray(Work(breaks, never, None), None, 1)
     with pytest.raises(ZeroDivisionError, match="ours"):
-        list(engine(iter(tasks(tmp_path, 1))))
+        all_done(engine, tasks(tmp_path, 1))
 
 
 def test_without_ray_its_extra_is_named(monkeypatch):

@@ -17,6 +17,12 @@ export interface Level {
   vertex_rule?: { proximity_ratio: Summary; gate: Summary };
 }
 
+export interface Advice {
+  text: string;
+  /** Those that the text names, as HTTP spells them: `crease=off`. */
+  options: string[];
+}
+
 export interface Report {
   scheme: string;
   base: string;
@@ -25,13 +31,13 @@ export interface Report {
   model_hash: string | null;
   totals: { vertices: number; faces: number };
   dropped: Record<string, number>;
-  changes: { pointer: string; what: string; count: number }[];
-  /** By what was changed: whether that is harmless, or what to do. */
-  hints?: Record<string, string>;
+  changes: { pointer: string; code: string; what: string; count: number }[];
+  /** By the code of what was changed: whether that is harmless, or what to do. */
+  hints?: Record<string, Advice>;
   levels: Level[];
   meshes: MeshReport[];
   /** Why little changed, and which setting changes that. */
-  advice?: string[];
+  advice?: Advice[];
 }
 
 export interface MeshReport {

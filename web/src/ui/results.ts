@@ -4,7 +4,7 @@ import type { Comparison } from "../validate/compare";
 import { bytes, count, figure, listed, seconds } from "../report/format";
 import type { Surface } from "../measure/surface";
 import { promises, type Lengths } from "../report/promises";
-import { sharpEdges, type Report } from "../report/report";
+import { sharpEdges, type Advice, type Report } from "../report/report";
 import type { Settings } from "../settings";
 import { element, make } from "./dom";
 
@@ -39,25 +39,37 @@ export function showPromises(report: Report, lengths: Lengths): string {
   return promised.map(({ title, text }) => `${title}: ${text}`).join(" ");
 }
 
-/** An option as the service spells it, the page's name for it, and the settings that it stands for. */
-const DEEDS: [RegExp, string, (value: string) => Partial<Settings>][] = [
-  [/crease=off/, "Round throughout", () => ({ crease: "off" })],
-  [/crease=angle:(\d+)/, "Crisp edges", (angle) => ({ crease: "angle", angle: Number(angle) })],
-  [/normals=smooth/, "Smooth shading", () => ({ normals: "smooth" })],
-  [/weld_tolerance=[\d.]+/, "Close small gaps", () => ({ weld: true })],
-];
+/** Options of the service that the page names itself, and the settings that their values stand for. */
+const DEEDS: Record<string, (value: string) => [string, Partial<Settings>]> = {
+  crease: (value) =>
+    value === "off"
+      ? ["Round throughout", { crease: "off" }]
+      : ["Crisp edges", { crease: "angle", angle: Number(value.replace("angle:", "")) }],
+  normals: () => ["Smooth shading", { normals: "smooth" }],
+  weld_tolerance: () => ["Close small gaps", { weld: true }],
+};
+
+/** The page's names for options of an advice, and their settings. */
+function deeds({ options }: Advice): { option: string; label: string; settings: Partial<Settings> }[] {
+  return options.flatMap((option) => {
+    const [name = "", value = ""] = option.split("=");
+    const [label, settings] = DEEDS[name]?.(value) ?? [];
+    return label && settings ? [{ option, label, settings }] : [];
+  });
+}
 
 /** Show the first thing that the user should know or do, and buttons that do it. */
 export function showAdvice(report: Report, set: (settings: Partial<Settings>) => void): void {
-  const asked = changesOf(report).filter(({ hint }) => DEEDS.some(([option]) => option.test(hint)));
-  const [text = ""] = [...(report.advice ?? []), ...asked.map(({ text }) => text)];
-  element("advice").hidden = !text;
-  element("advice-text").textContent = inOurWords(text);
+  const asked = changesOf(report).flatMap(({ text, advice }) =>
+    advice && deeds(advice).length ? [{ text, options: advice.options }] : [],
+  );
+  const [first] = [...(report.advice ?? []), ...asked];
+  element("advice").hidden = !first;
+  element("advice-text").textContent = first ? inOurWords(first.text, first) : "";
   element("advice-deeds").replaceChildren(
-    ...DEEDS.flatMap(([option, label, settings]) => {
-      const found = option.exec(text);
-      return found ? [make("button", { textContent: label, onclick: () => set(settings(found[1] ?? "")) })] : [];
-    }),
+    ...(first ? deeds(first) : []).map(({ label, settings }) =>
+      make("button", { textContent: label, onclick: () => set(settings) }),
+    ),
   );
 }
 
@@ -100,7 +112,7 @@ export function showTimings(rows: [string, number][]): void {
 interface ListedChange {
   /** What was changed, how often, and what to do. */
   text: string;
-  hint: string;
+  advice: Advice | undefined;
   where: string;
 }
 
@@ -109,16 +121,19 @@ function changesOf(report: Report): ListedChange[] {
   const changes = new Map<string, Report["changes"]>();
   for (const change of report.changes) changes.set(change.what, [...(changes.get(change.what) ?? []), change]);
   for (const [name, count] of Object.entries(report.dropped)) {
+    const code = name === "vertices" ? "unused-vertices" : name.replaceAll("_", "-");
     const what = `${name.replaceAll("_", " ")} dropped`;
-    if (count && !changes.has(what)) changes.set(what, [{ pointer: "", what, count }]);
+    if (count && !report.changes.some((change) => change.code === code)) {
+      changes.set(what, [{ pointer: "", code, what, count }]);
+    }
   }
   return [...changes].map(([what, all]) => {
     const times = all.reduce((sum, { count }) => sum + count, 0);
-    const hint = report.hints?.[what] ?? "";
+    const advice = report.hints?.[all[0]?.code ?? ""];
     const places = all.map(({ pointer }) => [nameAt(report, pointer), pointer].filter(Boolean).join(", "));
     return {
-      text: `${times > 1 ? `${count(times)} × ` : ""}${what}${hint && `: ${hint}`}`,
-      hint,
+      text: `${times > 1 ? `${count(times)} × ` : ""}${what}${advice ? `: ${advice.text}` : ""}`,
+      advice,
       where: listed(places.filter(Boolean), 1),
     };
   });
@@ -129,16 +144,16 @@ export function showChanges(report: Report): void {
   element("changes-count").textContent = all.length ? String(all.length) : "none";
   element("changes").replaceChildren(
     ...(all.length
-      ? all.map(({ text, where }) =>
-          make("li", {}, inOurWords(text), ...(where ? [make("span", { className: "where", textContent: where })] : [])),
+      ? all.map(({ text, advice, where }) =>
+          make("li", {}, inOurWords(text, advice), ...(where ? [make("span", { className: "where", textContent: where })] : [])),
         )
       : [make("li", { className: "note", textContent: "Nothing beside the geometry changed." })]),
   );
 }
 
 /** Name settings as the page does. */
-function inOurWords(text: string): string {
-  return DEEDS.reduce((said, [option, label]) => said.replace(option, `“${label}”`), text);
+function inOurWords(text: string, advice?: Advice): string {
+  return (advice ? deeds(advice) : []).reduce((said, { option, label }) => said.replace(option, `“${label}”`), text);
 }
 
 /** The name of the mesh that a pointer leads to; "" without one. */

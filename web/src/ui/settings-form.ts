@@ -3,7 +3,7 @@
 import type { Limits, ModelEntry } from "../api/client";
 import type { Opened } from "../files/open";
 import { count, counted } from "../report/format";
-import { DEFAULTS, isClassic, learns, LOOP, SCHEME, type Asked, type Settings } from "../settings";
+import { CHOICES, DEFAULTS, isClassic, learns, LOOP, SCHEME, SWITCHES, type Asked, type Settings } from "../settings";
 import { element, input, option, select } from "./dom";
 import { describeModel, ruleName } from "./models";
 
@@ -157,13 +157,9 @@ export class SettingsForm {
     // Before the lists are there, a link may name a rule of them.
     const isUnknown = select("model").value !== settings.model && this.models.length > 0 && this.limits !== null;
     if (isUnknown) select("model").value = settings.model = this.wanted.model = "";
-    input("limit").checked = settings.limit;
-    select("crease").value = settings.crease;
     input("angle").value = String(settings.angle);
-    select("uv").value = settings.uv;
-    input("weld").checked = settings.weld;
-    input("polygons").checked = settings.polygons;
-    select("normals").value = settings.normals;
+    for (const name of Object.keys(CHOICES) as (keyof typeof CHOICES)[]) select(name).value = settings[name];
+    for (const name of SWITCHES) input(name).checked = settings[name];
     this.adjust();
   }
 
@@ -175,19 +171,16 @@ export class SettingsForm {
     const own = this.model?.budget ?? 0;
     const share = Number(input("strength").value) / 100;
     const settings: Settings = {
+      ...before,
       levels: bends ? before.levels : Number(select("levels").value),
       faces: bends ? this.stops[Number(input("detail").value)] ?? null : null,
       model: select("model").value,
       // A link may hold any number: it stays until the strength itself is moved.
       budget: target !== input("strength") ? before.budget : share === 1 ? null : share * own,
-      limit: input("limit").checked,
-      crease: select("crease").value as Settings["crease"],
       angle: angle.validity.valid ? Number(angle.value || DEFAULTS.angle) : before.angle,
-      uv: select("uv").value as Settings["uv"],
-      weld: input("weld").checked,
-      polygons: input("polygons").checked,
-      normals: select("normals").value as Settings["normals"],
     };
+    Object.assign(settings, Object.fromEntries(Object.keys(CHOICES).map((name) => [name, select(name).value])));
+    Object.assign(settings, Object.fromEntries(SWITCHES.map((name) => [name, input(name).checked])));
     // Each model has its own budget.
     if (target === select("model")) settings.budget = null;
     const isNew = ([name, value]: [string, unknown]) => value !== before[name as keyof Settings];

@@ -19,7 +19,7 @@ from pns_common.model.file import COMPANIONS, companion_of
 from pns_common.model.session import Model
 from pns_common.operator.scheme import named_scheme
 
-from .creases import marked_creases, with_shown
+from .creases import Sharp, marked_creases, with_shown
 from .hidden import hide_within
 from .shading import shaded
 from .snapshot import Control, Layer, Refined, Snapshot
@@ -31,32 +31,28 @@ POSITIONS, BASE, VERTICES = 0.6, 0.75, 0.9
 
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Sharp):
     """Options of one refinement.
 
     ``model`` is the learned correction and ``budget`` its C; without a model it is Loop.
-    ``crease_angle`` (radians) makes edges sharp whose faces meet at a larger angle; None makes
-    none. ``crease_lines`` keeps those sharp that the mesh or its shading shows, where the model's
-    card asks for it. ``border`` is the rule of boundaries, as in ``pns_common.Creases``.
-    ``uv_keep`` is what stays linear of UV maps. ``tolerance`` (as of ``pns_common.refine``) or
-    ``max_faces`` make faces only where the surface bends, and ``levels`` has no effect.
+    ``uv_keep`` is what stays linear of UV maps. ``tolerance``, ``angle``
+    or ``max_faces`` (as of ``pns_common.refine``) make faces only where the surface bends, and
+    ``levels`` has no effect.
     """
 
     model: Model | None
     levels: int
     budget: float | None = None
     limit: bool = True
-    crease_angle: float | None = None
-    crease_lines: bool = True
-    border: str = "smooth"
     uv_keep: Linear = "boundaries"
     tolerance: str | None = None
+    angle: float | None = None
     max_faces: int | None = None
 
     @property
     def goals(self) -> dict[str, Any]:
         """Goals of faces of several levels, as arguments of the library's refine."""
-        given = {"tolerance": self.tolerance, "max_faces": self.max_faces}
+        given = {name: getattr(self, name) for name in ("tolerance", "angle", "max_faces")}
         return {name: goal for name, goal in given.items() if goal is not None}
 
 
@@ -70,7 +66,7 @@ def compute(snapshot: Snapshot, choice: Choice, progress: Progress = lambda shar
         _check_goal(snapshot, choice)
     scheme = scheme_of(snapshot, choice)
     control = snapshot.control(whole=scheme.base.polygons)
-    creases = marked = marked_creases(snapshot, control, choice.crease_angle, choice.border)
+    creases = marked = marked_creases(snapshot, control, choice)
     shows = choice.crease_lines and scheme.creases.finds
     if shows:
         creases = with_shown(marked, snapshot, control, scheme.creases, for_good=bool(choice.goals))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -24,14 +24,26 @@ def crease_of(crease_sharpness: Float[np.ndarray, " E"]) -> Float[np.ndarray, " 
     return np.sqrt(np.clip(crease_sharpness / SHARPEST, 0, 1))
 
 
-def marked_creases(
-    snapshot: Snapshot, control: Control, angle: float | None, border: str
-) -> Creases:
-    """Return edges and vertices that are marked, and edges bent beyond ``angle`` (radians)."""
+@dataclass(frozen=True, kw_only=True)
+class Sharp:
+    """Edges that stay sharp, beside those that are marked.
+
+    Those whose faces meet at more than ``crease_angle`` (radians), if it is given; and with
+    ``crease_lines`` those that the mesh or its shading shows, where the model's card asks for it.
+    ``border`` is the rule of boundaries, as in ``pns_common.Creases``.
+    """
+
+    crease_angle: float | None = None
+    crease_lines: bool = True
+    border: str = "smooth"
+
+
+def marked_creases(snapshot: Snapshot, control: Control, chosen: Sharp) -> Creases:
+    """Return edges and vertices that are marked, and edges bent beyond the chosen angle."""
     marked = (snapshot.crease_sharpness > 0) & control.there
     pairs, sharpness = snapshot.edges[marked], snapshot.crease_sharpness[marked]
-    if angle is not None:
-        bent = sharp_edges(control.mesh, float(np.degrees(angle)))
+    if chosen.crease_angle is not None:
+        bent = sharp_edges(control.mesh, float(np.degrees(chosen.crease_angle)))
         pairs = np.concatenate([pairs, bent])
         sharpness = np.r_[sharpness, np.full(len(bent), np.inf)]
     vertices = np.flatnonzero(snapshot.vertex_sharpness)
@@ -40,7 +52,7 @@ def marked_creases(
         sharpness,
         vertices=vertices,
         vertex_sharpness=snapshot.vertex_sharpness[vertices],
-        border=border,
+        border=chosen.border,
         wears=True,
     )
 

@@ -6,13 +6,11 @@ import bpy
 import numpy as np
 from bl_ext.user_default.pns_refine.live_watch import WATCH
 
-# A cube whose faces look outwards.
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
 def cube(name="Cube"):
-    """A cube of quads, active and selected."""
     return placed(name, CORNERS, SIDES)
 
 
@@ -25,7 +23,6 @@ def grid(cells, name="Grid"):
 
 
 def placed(name, points, faces, edges=()):
-    """An object of these, active and selected."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, edges, faces)
     mesh.update()
@@ -33,7 +30,6 @@ def placed(name, points, faces, edges=()):
 
 
 def shown_here(obj):
-    """The object in the scene, active and selected."""
     bpy.context.scene.collection.objects.link(obj)
     return chosen(obj)
 
@@ -49,7 +45,6 @@ def linked(obj, path):
 
 
 def chosen(obj):
-    """Make it the only one that is selected, and active."""
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
     obj.select_set(True)
@@ -83,12 +78,10 @@ def refined(obj, **settings):
 
 
 def notes(obj):
-    """The losses that the panel names."""
     return "\n".join(json.loads(obj.data.pns_result.notes))
 
 
 def points_of(mesh):
-    """The vertices (V, 3)."""
     return numbers(mesh.vertices, "co", 3)
 
 
@@ -100,7 +93,6 @@ def numbers(rows, field="value", width=1):
 
 
 def evaluated(obj):
-    """The mesh with all modifiers."""
     bpy.context.view_layer.update()
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 

@@ -26,47 +26,43 @@ from scene import (
 
 import pns_common
 
+GENERAL = pns_common.pns(pns_common.load_model())
+FACES, NEAR = {"detail": "FACES", "max_faces": 1000}, {"detail": "TOLERANCE", "tolerance": 0.5}
+TURNED = {"detail": "ANGLE", "angle": np.radians(20)}
+
 
 @pytest.mark.parametrize(
-    "settings",
-    [{}, {"scheme": "LOOP"}, {"budget": 0.0}, {"limit": False}, {"crease_angle": 0.2, "levels": 1}],
+    ("settings", "scheme", "expected"),
+    [
+        ({}, GENERAL, {}),
+        ({"budget": 0.0}, pns_common.pns(pns_common.load_model(), 0.0), {}),
+        ({"limit": False}, GENERAL, {"limit": False}),
+        ({"crease_angle": 0.2, "levels": 1}, GENERAL, {"levels": 1, "creases": 0.2}),
+        ({"scheme": "LOOP"}, "loop", {}),
+        (FACES | {"scheme": "LOOP"}, "loop", {"max_faces": 1000, "levels": None, "creases": None}),
+        (NEAR | {"scheme": "LOOP"}, "loop", {"tolerance": "0.5%", "levels": None, "creases": None}),
+        (TURNED | {"scheme": "LOOP"}, "loop", {"angle": 20, "levels": None, "creases": None}),
+    ],
 )
-def test_positions_are_those_of_the_library(settings):
-    mesh = grid(6).data
-    faces = [list(p.vertices) for p in mesh.polygons]
-    if settings.get("scheme") == "LOOP":
-        mesh.calc_loop_triangles()
-        faces = numbers(mesh.loop_triangles, "vertices", 3).astype(np.int64)
-    rule = pns_common.pns(pns_common.load_model(), settings.get("budget"))
-    control, creases = pns_common.Mesh(points_of(mesh), faces), "auto"
-    if "crease_angle" in settings:
-        bent = pns_common.sharp_edges(control, np.degrees(settings["crease_angle"]))
-        creases = pns_common.Creases(bent, learned=True, levels=6)
-    expected = pns_common.refine(
-        control,
-        "loop" if "scheme" in settings else rule,
-        settings.get("levels", 2),
-        limit=settings.get("limit", True),
-        creases=creases,
-    )
-    points = points_of(refined(bpy.context.object, **settings).data)
-    np.testing.assert_allclose(points, expected.mesh.vertices, rtol=0, atol=1e-6)
-
-
-def test_detail_makes_faces_where_the_surface_bends():
+def test_positions_are_those_of_the_library(settings, scheme, expected):
+    """Of quads, for Loop of their triangles."""
     obj = grid(9)
-    with pytest.raises(RuntimeError, match="triangulate it"):
-        refined(obj, detail="FACES", max_faces=1000)
-    obj.data.calc_loop_triangles()
-    faces = [list(t.vertices) for t in obj.data.loop_triangles]
-    obj = placed("Triangles", points_of(obj.data).tolist(), faces)
-    mesh = pns_common.Mesh(points_of(obj.data), faces)
-    expected = pns_common.refine(mesh, pns_common.loop(), max_faces=1000, creases=None)
-    made = refined(obj, detail="FACES", max_faces=1000, scheme="LOOP").data
-    np.testing.assert_allclose(points_of(made), expected.mesh.vertices, rtol=0, atol=1e-6)
-    assert 900 < len(made.polygons) <= 1000
-    near = refined(obj, detail="TOLERANCE", tolerance=0.05).data
-    assert "adaptive" in near.pns_result.report
+    mesh, faces = obj.data, [list(p.vertices) for p in obj.data.polygons]
+    if scheme == "loop":
+        mesh.calc_loop_triangles()
+        faces = numbers(mesh.loop_triangles, "vertices", 3).astype(int).tolist()
+    control = pns_common.Mesh(points_of(mesh), faces)
+    if settings.get("detail"):
+        with pytest.raises(RuntimeError, match="triangulate it"):
+            refined(obj, **settings)
+        obj = placed("Triangles", points_of(mesh).tolist(), faces)
+    if expected.get("creases"):
+        bent = pns_common.sharp_edges(control, np.degrees(expected["creases"]))
+        expected = expected | {"creases": pns_common.Creases(bent, learned=True, levels=6)}
+    made = refined(obj, **settings).data
+    points = pns_common.refine(control, scheme, **{"levels": 2} | expected).mesh.vertices
+    np.testing.assert_allclose(points_of(made), points, rtol=0, atol=1e-6)
+    assert ("adaptive" in made.pns_result.report) == ("detail" in settings)
 
 
 def test_the_original_stays_with_the_result_beside_it_or_gets_it():

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from pns_common import Mesh, loop, refine, subdivide
+from pns_common import Mesh, load_model, loop, refine, subdivide
 from service.errors import InvalidParameter, LimitError
 from service.gltf.subdivide import subdivide_gltf
 from service.meshfiles.convert import converted
 from service.options import Limits, Options
+from service.stages import Stages
 from tests.support.gltf import files
 from tests.support.gltf.shapes import octahedron
 from tests.support.meshes import bumpy_sphere
@@ -31,7 +32,9 @@ def library(**goal):
     return refine(Mesh(shape["POSITION"].astype(float), shape["indices"]), loop(), **goal)
 
 
-@pytest.mark.parametrize("goal", [GOAL, {"max_faces": 200}, {"max_edge_length": "12%"}])
+@pytest.mark.parametrize(
+    "goal", [GOAL, {"angle": 20.0}, {"max_faces": 200}, {"max_edge_length": "12%"}]
+)
 def test_faces_are_the_librarys(goal):
     faces, attributes = files.primitive_of(refined([shaped()], **goal).glb)
     made = library(**goal).mesh
@@ -89,6 +92,12 @@ def test_normals_are_those_of_the_limit_surface():
     )
 
 
+def test_normals_of_their_author_stay():
+    up = np.tile([0.0, 0.0, 1.0], (len(shaped()["POSITION"]), 1)).astype(np.float32)
+    _, attributes = files.primitive_of(refined([shaped(NORMAL=up)], **GOAL).glb)
+    assert (attributes["NORMAL"] == [0, 0, 1]).all(axis=1).mean() > 1 / 2
+
+
 def test_mesh_files_are_refined_alike():
     shape, made = shaped(), library(**GOAL)
     rows = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in shape["POSITION"].astype(float).tolist())
@@ -121,6 +130,9 @@ def test_data_of_other_libraries_follow():
         ({"tolerance": "0"}, "tolerance"),
         ({"tolerance": "-1"}, "tolerance"),
         ({"tolerance": "nan"}, "tolerance"),
+        ({"angle": 0.0}, "angle"),
+        ({"angle": 180.0}, "angle"),
+        ({"angle": float("nan")}, "angle"),
         ({"max_edge_length": "1 mm"}, "max_edge_length"),
         ({"max_faces": 0}, "max_faces"),
         ({"tolerance": "1", "uv": "smooth"}, "uv"),
@@ -139,6 +151,32 @@ def test_fewer_faces_than_there_are_is_an_error_that_says_how_many_are_possible(
     with pytest.raises(InvalidParameter, match="at least 8") as error:
         refined([octahedron()], max_faces=3)
     assert error.value.name == "max_faces"
+
+
+def test_what_whole_levels_would_make_is_no_reason_to_refuse():
+    shape, most = shaped(), Limits(max_faces=60)
+    rows = "".join(f"v {x} {y} {z}\n" for x, y, z in shape["POSITION"].tolist())
+    rows += "".join(f"f {a} {b} {c}\n" for a, b, c in (shape["indices"] + 1).tolist())
+    asked = Options(scheme="loop", max_faces=50), None
+    for goal in ({"tolerance": "90%"}, {"max_faces": 50}):
+        assert refined([shape], limits=most, **goal).report["totals"]["faces"] <= 50
+    assert converted(rows.encode(), "obj", "obj", *asked, most).faces <= 50
+    with pytest.raises(LimitError) as refusal:
+        refined([shape], limits=most, max_faces=70)
+    assert refusal.value.found == 70
+
+
+@pytest.mark.parametrize("goal", [{"tolerance": "0.1%"}, {"angle": 10.0}, {"max_faces": 900}])
+def test_progress_moves_through_the_work_and_its_stages(goal):
+    told, begun = [], []
+    stages = Stages(begins=begun.append, moves=told.append)
+    data, options = files.glb([shaped()]), Options(**goal)
+    subdivide_gltf(data, "glb", options, load_model(), Limits(), stages)
+    assert told == sorted(told)
+    assert told[-1] == 1
+    assert np.diff(told).max() < 0.3
+    assert begun.index("refine") < begun.index("attributes")
+    assert stages.seconds["attributes"] > 0
 
 
 def test_the_limit_of_faces_holds():

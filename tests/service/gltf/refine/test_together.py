@@ -147,7 +147,7 @@ def test_skins_targets_and_pieces_together_are_as_alone(
 @pytest.mark.parametrize(
     "asked", [{}, {"limit": True}, {"normals": "smooth"}, {"weld_tolerance": 0.001}], ids=str
 )
-def test_no_small_mesh_goes_alone(
+def test_no_small_mesh_without_poses_goes_alone(
     asked: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
@@ -155,7 +155,7 @@ def test_no_small_mesh_goes_alone(
 
     monkeypatch.setattr(meshes, "refine_alone", refuse)
     rng = np.random.default_rng(0)
-    shapes = [random_mesh(rng, number % 16) for number in range(64)]
+    shapes = [random_mesh(rng, 4 * (number % 4)) for number in range(64)]
     # Those that have no face to keep are not refined at all.
     whole = [shape for shape in shapes if sum(len(piece["indices"]) for piece in shape) > 4]
     assert len(whole) > 48
