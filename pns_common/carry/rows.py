@@ -17,7 +17,11 @@ def place_middles(
 ) -> None:
     """Write the values at the middles of edges."""
     given = np.ascontiguousarray(values), np.ascontiguousarray(edges)
-    blocks.run(len(edges), lambda begin, end: kernels.place_middles(*given, begin, end, middles))
+
+    def place(begin: int, end: int) -> None:
+        kernels.place_middles(*given, begin, end, middles)
+
+    blocks.run(len(edges), place)
 
 
 def rounded_rows(
@@ -26,5 +30,9 @@ def rounded_rows(
     """Return rows of values in single precision."""
     rounded = np.empty((len(rows), values.shape[1]), dtype=np.float32)
     given = np.ascontiguousarray(values), np.ascontiguousarray(rows)
-    blocks.run(len(rows), lambda begin, end: kernels.round_rows(*given, begin, end, rounded))
+
+    def write(begin: int, end: int) -> None:
+        kernels.round_rows(*given, begin, end, rounded)
+
+    blocks.run(len(rows), write)
     return rounded

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -43,6 +45,8 @@ from .mesh_refine import (
 )
 from .new_normals import with_normal_accessor, with_normal_rule, with_smooth_normals
 from .skin import skin_sets
+
+NOTHING_LOST = 0, 0.0
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,32 @@ class MeshOutcome:
         return replace(self, index=mesh, changes=moved)
 
 
+def outcome_of(
+    index: int,
+    primitives: Sequence[TrianglePrimitive],
+    kept: Sequence[Bool[np.ndarray, " F"]],
+    refined: Sequence[RefinedPrimitive],
+    levels: int,
+    near: int,
+    misses: int,
+    losses: tuple[int, float] = NOTHING_LOST,
+    **others: Any,
+) -> MeshOutcome:
+    """Return the outcome of a mesh with its changes.
+
+    `near` vertices were joined, and `misses` at borders nearly meet; `losses` are those of joints.
+    """
+    pointer = f"/meshes/{index}"
+    changes = [
+        change
+        for primitive, keep in zip(primitives, kept, strict=True)
+        for change in changes_of_primitive(primitive, keep, levels, pointer)
+    ]
+    changes += changes_of_vertices(near, *losses, pointer) + near_miss_changes(misses, pointer)
+    changes += opposed_normals(refined, pointer)
+    return MeshOutcome(index, primitives, kept, refined, changes=changes, **others)
+
+
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
     """Return what meshes that may be joined have in common; None for a mesh that may not.
 
@@ -120,7 +150,7 @@ def refine_batch(
     options: Options,
     stages: Stages,
     shares: StageShares,
-) -> list[MeshOutcome | None]:
+) -> Sequence[MeshOutcome | None]:
     """Refine meshes of one kind, given by their primitives; `numbers` are their places in the file.
 
     None for a mesh that must be refined alone: it has no face left or no extent, or it cannot be
@@ -131,8 +161,12 @@ def refine_batch(
     with stages.stage("weld", shares.weld, shares.refine):
         control = control_mesh(primitives, options, parts)
     able = _refinable(control, parts)
-    if control.is_empty or not able.all():
-        return _chosen(able, meshes, numbers, scheme, options, stages, shares)
+    if not able.any():
+        return [None] * len(meshes)
+    if not able.all():
+        some, theirs = list(compress(meshes, able)), list(compress(numbers, able))
+        made = iter(refine_batch(some, theirs, scheme, options, stages, shares))
+        return [next(made) if each else None for each in able]
     with stages.stage("weld", shares.weld, shares.refine):
         creases = creases_of(control, options, scheme, parts)
         if options.normals != "keep":
@@ -141,21 +175,13 @@ def refine_batch(
         try:
             made = refined_union(control, parts, creases, scheme, options)
         except MeshError:
-            # The error does not say which mesh it is: try halves, down to one mesh.
-            if len(meshes) == 1:
-                return [None]
-            half = np.arange(len(meshes)) < len(meshes) // 2
-            first, second = (
-                _chosen(each, meshes, numbers, scheme, options, stages, shares)
-                for each in (half, ~half)
-            )
-            return [one or other for one, other in zip(first, second, strict=True)]
+            # The error does not say which mesh it is; that of a mesh alone does.
+            return [None] * len(meshes)
     with stages.stage("attributes", shares.attributes, shares.write):
         pieces = refined_primitives(control, made, creases, options, stages)
         part_of_face = control.of_cleaned(parts.of_face[np.concatenate(control.kept)])
         bends = count_bends(control.mesh, creases, options, len(meshes), part_of_face)
-        cut = _divided(control, parts, made, pieces, meshes, numbers, options)
-        return [replace(part, bends=own) for part, own in zip(cut, bends, strict=True)]
+        return _divided(control, parts, made, pieces, meshes, numbers, bends, options)
 
 
 def _refinable(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
@@ -167,26 +193,6 @@ def _refinable(control: ControlMesh, parts: Parts) -> Bool[np.ndarray, " P"]:
     np.maximum.at(high, parts.of_face[proper], points[proper].max(axis=1))
     extended: Bool[np.ndarray, " P"] = np.any(high > low, axis=1)
     return extended
-
-
-def _chosen(
-    chosen: Bool[np.ndarray, " P"],
-    meshes: Sequence[Sequence[TrianglePrimitive]],
-    numbers: Sequence[int],
-    scheme: Scheme,
-    options: Options,
-    stages: Stages,
-    shares: StageShares,
-) -> list[MeshOutcome | None]:
-    """Refine some of the meshes together; None for the others."""
-    made: list[MeshOutcome | None] = [None] * len(meshes)
-    places = np.flatnonzero(chosen).tolist()
-    if places:
-        own, theirs = [meshes[place] for place in places], [numbers[place] for place in places]
-        parts = refine_batch(own, theirs, scheme, options, stages, shares)
-        for place, part in zip(places, parts, strict=True):
-            made[place] = part
-    return made
 
 
 def _smoothed(
@@ -240,6 +246,7 @@ def _divided(
     pieces: Sequence[RefinedPrimitive],
     meshes: Sequence[Sequence[TrianglePrimitive]],
     numbers: Sequence[int],
+    bends: Sequence[Bends],
     options: Options,
 ) -> list[MeshOutcome]:
     """Cut the refined primitives of the union into those of its parts."""
@@ -264,29 +271,21 @@ def _divided(
     lengths = [report["reference_length"] for report in made.reports]
     of_vertex = parts.of_row[control.vertex_rows()]
     misses = near_misses(control.mesh.vertices, control.mesh.topology(), lengths, of_vertex)
-    outcomes: list[MeshOutcome] = []
-    for part, (number, primitives) in enumerate(zip(numbers, meshes, strict=True)):
-        pointer, own = f"/meshes/{number}", [keep[part] for keep in kept]
-        changes = [
-            change
-            for primitive, keep in zip(primitives, own, strict=True)
-            for change in changes_of_primitive(primitive, keep, options.levels, pointer)
-        ]
-        changes += changes_of_vertices(near[part], 0, 0.0, pointer)
-        changes += near_miss_changes(misses[part], pointer)
-        changes += opposed_normals(refined[part], pointer)
-        outcomes.append(
-            MeshOutcome(
-                index=number,
-                primitives=primitives,
-                kept=own,
-                refined=refined[part],
-                copies=copies[part],
-                report=made.reports[part],
-                changes=changes,
-            )
+    return [
+        outcome_of(
+            number,
+            primitives,
+            [keep[part] for keep in kept],
+            refined[part],
+            options.levels,
+            near[part],
+            misses[part],
+            copies=copies[part],
+            report=made.reports[part],
+            bends=bends[part],
         )
-    return outcomes
+        for part, (number, primitives) in enumerate(zip(numbers, meshes, strict=True))
+    ]
 
 
 def _divided_primitive(

@@ -23,14 +23,15 @@ from ..read.primitives import TrianglePrimitive, read_primitive
 from ..read.upload import Upload
 from .adaptive import refine_to_goal
 from .attributes import RefinedPrimitive, refined_primitives
-from .batch import MeshOutcome, StageShares, kind_of, refine_batch
-from .changes import (
-    changes_of_primitive,
-    changes_of_vertices,
-    near_miss_changes,
-    near_misses,
-    opposed_normals,
+from .batch import (
+    NOTHING_LOST,
+    MeshOutcome,
+    StageShares,
+    kind_of,
+    outcome_of,
+    refine_batch,
 )
+from .changes import near_misses
 from .control_mesh import ControlMesh, control_mesh
 from .mesh_refine import (
     creases_of,
@@ -260,27 +261,21 @@ def refine_alone(
             refined = refined_primitives(control, made, creases, options, stages)
             outlines = refined_outlines(control, made.levels)
             refined = [with_outline(each, outlines) for each in refined]
-    changes = [
-        change
-        for primitive, keep in zip(control.primitives, control.kept, strict=True)
-        for change in changes_of_primitive(primitive, keep, options.levels, pointer)
-    ]
-    (near,) = control.near.tolist()
-    cut, lost = (0, 0.0) if made is None else made.skin_and_morph.losses
-    changes += changes_of_vertices(near, cut, lost, pointer)
+    misses, lost = 0, NOTHING_LOST
     if made is not None and made.topology is not None:
-        length = made.reports[0]["reference_length"]
+        length, lost = made.reports[0]["reference_length"], made.skin_and_morph.losses
         (misses,) = near_misses(control.surface.vertices, made.topology, [length])
-        changes += near_miss_changes(misses, pointer)
-        changes += opposed_normals(refined, pointer)
-    return MeshOutcome(
-        index=plan.mesh,
-        primitives=primitives,
-        kept=control.kept,
-        refined=refined,
+    return outcome_of(
+        plan.mesh,
+        primitives,
+        control.kept,
+        refined,
+        options.levels,
+        int(control.near[0]),
+        misses,
+        lost,
         copies=control.copies,
         report=None if made is None else made.reports[0],
-        changes=changes,
         bends=NO_BENDS if made is None else count_bends(control.surface, creases, options)[0],
         parents=None if made is None or made.parents is None else _of_rows(made.parents, control),
     )
