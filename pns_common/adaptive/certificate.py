@@ -54,7 +54,8 @@ def slabs(
     asked = np.hstack([sides, np.zeros((count, 1), dtype=bool)])[:, of_face]
     compared = np.ascontiguousarray(np.where(asked, of_face, -1).reshape(-1, 3), dtype=np.int32)
     about = triangles.repeat(each, axis=0)
-    made = _measured(part, faces.reshape(-1).astype(np.int64), about, compared, levels, enough)
+    of_sides = compared, np.ascontiguousarray(sides.repeat(each, axis=0))
+    made = _measured(part, faces.reshape(-1).astype(np.int64), about, of_sides, levels, enough)
     made = made.reshape(count, each, -1)
     return np.column_stack(
         [made[:, :, LOW].min(axis=1), made[:, :, HIGH].max(axis=1), made[:, :, SIDE].max(axis=1)]
@@ -117,14 +118,16 @@ def cut_distances(
     low, high = slabs[:, LOW], slabs[:, HIGH]
     known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
     sizes = np.where(np.isnan(height), high - low, known)
-    return np.maximum(sizes, 2 * slabs[:, SIDE])
+    # What lies beyond a side is so far from where the side was, which the cut may move.
+    side = slabs[:, SIDE]
+    return np.maximum(sizes, np.where(side > 0, distances(slabs) + side, 0.0))
 
 
 def _measured(
     part: Part,
     faces: Integer[np.ndarray, " N"],
     triangles: Float[np.ndarray, "N 3 3"],
-    compared: Integer[np.ndarray, "N 3"],
+    sides: tuple[Integer[np.ndarray, "N 3"], Bool[np.ndarray, "N 3"]],
     levels: Levels,
     enough: float,
 ) -> Float[np.ndarray, "N 4"]:
@@ -141,7 +144,7 @@ def _measured(
     read = points, mesh.corners, mesh.corner_edges, mesh.half_edges, mesh.edge_class
     net = net_of_quartics()
     rings = mesh.sharpness, mesh.valence, rules, beta(np.arange(kernels.MOST + 1)), net
-    asked = faces, np.ascontiguousarray(triangles).reshape(-1, 3), compared, enough, steps
+    asked = faces, np.ascontiguousarray(triangles).reshape(-1, 3), *sides, enough, steps
 
     def work(begin: int, end: int) -> None:
         rows = kernels.DEEPEST + 1
@@ -155,7 +158,7 @@ def _measured(
     rows = np.flatnonzero(made[:, UNKNOWN])
     if len(rows):
         about = triangles.reshape(-1, 3, 3)[rows]
-        made[rows, :UNKNOWN] = _hulls(part, mesh.faces[faces[rows]], about, compared[rows])
+        made[rows, :UNKNOWN] = _hulls(part, mesh.faces[faces[rows]], about, sides[1][rows])
     return made
 
 
@@ -163,7 +166,7 @@ def _hulls(
     part: Part,
     corners: Integer[np.ndarray, "N 3"],
     triangles: Float[np.ndarray, "N 3 3"],
-    compared: Integer[np.ndarray, "N 3"],
+    fenced: Bool[np.ndarray, "N 3"],
 ) -> Float[np.ndarray, "N 3"]:
     """Return slabs of faces by all control points around their corners."""
     ends = part.topology.edges.astype(np.int64)
@@ -188,5 +191,5 @@ def _hulls(
         reach = np.linalg.norm(to + triangles[face, 0] - triangles[face, corner], axis=1)
         np.maximum.at(away, face, reach)
     made[:, HIGH] = np.where(lengths > 0, made[:, HIGH], away)
-    made[:, SIDE] = np.where((compared >= 0).any(axis=1), away, 0.0)
+    made[:, SIDE] = np.where(fenced.any(axis=1), away, 0.0)
     return made

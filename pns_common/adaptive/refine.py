@@ -40,6 +40,8 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 # Errors to which trees are grown fall by this at most from one to the next, and are always below
 # the largest that is left.
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
+# Errors whose ratio is this near to 1 are equal: networks compute in single precision.
+EQUAL = 1e-4
 # Shares of the work, roughly: until the learned level is there, until trees have all their faces
 # but those that closing adds, and until those to split are chosen.
 LEARNED, GROWN, CHOSEN = 0.15, 0.65, 0.75
@@ -328,7 +330,7 @@ def _with_so_many(start: Start, shares: Shares) -> Tree:
         known = tree.measured
         del tree
         tree = start.grow(threshold, known=known)
-    order, turn = _worst_first(tree), 0
+    (order, errors), turn = _worst_first(tree), 0
     low, fewer = 0, tree.layers[0].part.topology.face_count
     high, more = len(order), made
     if made <= most:
@@ -338,16 +340,24 @@ def _with_so_many(start: Start, shares: Shares) -> Tree:
         # Faces are nearly proportional to splits; each third time the middle, so that it ends.
         turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
         middle = min(max(low + int(share * (high - low)), low + 1), high - 1)
-        made = tree.count(tree.closed(_flagged(tree, order[:middle])))
+        made = tree.count(tree.closed(_flagged(tree, order[: _untied(errors, middle)])))
         if made <= most:
             low, fewer = middle, made
         else:
             high, more = middle, made
         shares.reach(1 - (high - low).bit_length() / len(order).bit_length(), fewer)
     shares.part(CHOSEN, 1.0)
-    forced, known = tree.codes(tree.closed(_flagged(tree, order[:low]))), tree.measured
+    first = _flagged(tree, order[: _untied(errors, low)])
+    forced, known = tree.codes(tree.closed(first)), tree.measured
     del tree
     return start.grow(threshold, forced, only=True, known=known)
+
+
+def _untied(errors: Float[np.ndarray, " N"], count: int) -> int:
+    """Return how many of the first errors are split: those that are equal together, or not."""
+    if count == len(errors):
+        return count
+    return int(np.argmax(errors <= errors[count] * (1 + EQUAL)))
 
 
 def _largest_left(tree: Tree, deepest: int) -> float:
@@ -359,8 +369,8 @@ def _largest_left(tree: Tree, deepest: int) -> float:
     return float(max(errors))
 
 
-def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
-    """Return depth and row of split faces, those of the largest errors first, by place if equal."""
+def _worst_first(tree: Tree) -> tuple[Integer[np.ndarray, "N 2"], Float[np.ndarray, " N"]]:
+    """Return depth and row of split faces, and errors, largest first; equal ones by place."""
     errors, above = [layer.errors.copy() for layer in tree.layers], list[np.ndarray]()
     for depth in range(len(errors) - 1, 0, -1):
         # A face is not better than its children, so that none comes before its parent.
@@ -377,7 +387,7 @@ def _worst_first(tree: Tree) -> Integer[np.ndarray, "N 2"]:
     size = np.abs(places).max(initial=0.0) or 1.0
     keys = np.round(places / size, DIGITS)
     order = np.lexsort([*keys.T[::-1], np.concatenate(at)[:, 0], -_shortened(error)])
-    return np.concatenate(at)[order]
+    return np.concatenate(at)[order], error[order]
 
 
 def _shortened(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 
 from pns_common.kernels import (
+    b1_2d,
     f8_1d,
     f8_2d,
     i1_1d,
@@ -377,7 +378,9 @@ def reached(placed, r):
 
 
 @inlined
-def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, side, enough, steps):
+def explored(
+    z, placed, w, shape, beta, net, stars, ordinates, child, sides, side, above, enough, steps
+):
     """Return bounds of values on a patch or a side of a face, whose stars are the first three.
 
     Args:
@@ -385,14 +388,16 @@ def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, sid
         beta, net: as of ``measure_faces``.
         stars, ordinates, child, sides: room.
         side: a side of the face; negative: the patch.
+        above: whether values below 0 do not matter; they count as 0.
         enough: bounds below this are good enough.
         steps: so often faces may be refined.
     """
     if steps == 0:
         return patch_bounds(z, w, shape, 0) if side < 0 else side_bounds(z, w, shape, 0, side)
     low, high, spare = bounds(z, w, shape, 0, side, net, stars, ordinates)
+    low = 0.0 if above else low
     worst, least = max(-low, high), 0.0
-    if side < 0:
+    if side < 0 and not above:
         least = min(abs(z[0, CENTRE]), abs(z[1, CENTRE]), abs(z[2, CENTRE]))
         if (z[0, CENTRE] > 0) != (z[1, CENTRE] > 0) or (z[0, CENTRE] > 0) != (z[2, CENTRE] > 0):
             least = 0.0
@@ -407,7 +412,7 @@ def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, sid
         refine_star(z, w, shape, beta, c, placed)
     if 0 <= spare <= LITTLE * worst:
         lowest, highest, steps = -enough, enough, 1
-    elif side < 0:
+    elif side < 0 and not above:
         # Nearer than needed to tell whether it is to be split, and how it can be cut, takes long.
         lowest, highest = reached(placed, 0)
         far = max(-lowest, highest)
@@ -439,6 +444,7 @@ def explored(z, placed, w, shape, beta, net, stars, ordinates, child, sides, sid
             for k in range(3):
                 middle_star(placed, w, shape, r + k, r + (k + 1) % 3, 1, z, to + k)
         down, up, _ = bounds(z, w, shape, to, of_child, net, stars, ordinates)
+        down = 0.0 if above else down
         if level + 1 < steps and (max(down, low) < lowest or min(up, high) > highest):
             level += 1
             child[level], sides[level] = 0, of_child
@@ -473,6 +479,7 @@ def measure_faces(
     rows: i8_1d,
     triangles: f8_2d,
     compared: i4_2d,
+    fenced: b1_2d,
     enough: float,
     steps: int,
     begin: int,
@@ -497,12 +504,14 @@ def measure_faces(
         triangles: (3 N, 3) corners of the triangles.
         compared: (N, 3) the triangle's side that each side of a face, from its corner on, is to be
             compared with as a curve; −1: none.
+        fenced: (N, 3) sides of triangles beyond which no part of a patch is to be far.
         enough: bounds below this are good enough; 0: none is.
         steps: so often faces may be refined.
         numbers, whole: room of 9 (DEEPEST + 1) + 3 and 3 (DEEPEST + 1) + 8 rows, WIDTH wide.
         ordinates: (N,) room.
-        to: (N, 4) out: least and largest height over the triangle's plane; how far curves are from
-            their sides; 1 where the bounds are not known.
+        to: (N, 4) out: least and largest height over the triangle's plane, or where the patch lies
+            beyond a fenced side, minus and plus the distance from the triangle; how far curves
+            are from their sides; 1 where the bounds are not known.
     """
     each = 3 * (DEEPEST + 1)
     z, placed, w = numbers[:each], numbers[each : 2 * each], numbers[2 * each : 3 * each]
@@ -537,7 +546,7 @@ def measure_faces(
             continue
         set_values(points, corners, 3 * rows[i], around, shape, n, p, z)
         low, high = explored(
-            z, placed, w, shape, beta, net, stars, ordinates, child, sides, -1, enough, steps
+            z, placed, w, shape, beta, net, stars, ordinates, child, sides, -1, False, enough, steps
         )
         to[i, 0], to[i, 1] = min(low, 0.0), max(high, 0.0)
         for k in range(3):
@@ -552,7 +561,49 @@ def measure_faces(
             for direction in (n, across_it):
                 set_values(points, corners, 3 * rows[i], around, shape, direction, origin, z)
                 low, high = explored(
-                    z, placed, w, shape, beta, net, stars, ordinates, child, sides, k, enough, steps
+                    z,
+                    placed,
+                    w,
+                    shape,
+                    beta,
+                    net,
+                    stars,
+                    ordinates,
+                    child,
+                    sides,
+                    k,
+                    False,
+                    enough,
+                    steps,
                 )
                 away += max(-low, high) ** 2
             to[i, 2] = max(to[i, 2], math.sqrt(away))
+        beyond, height = 0.0, max(-to[i, 0], to[i, 1])
+        for s in range(3):
+            if not fenced[i, s]:
+                continue
+            origin = p if s == 0 else (q if s == 1 else r)
+            along = difference(q if s == 0 else (r if s == 1 else p), origin)
+            out = cross(over(along, divisor(along)), n)
+            set_values(points, corners, 3 * rows[i], around, shape, out, origin, z)
+            least = math.sqrt(max(enough**2 - height**2, enough**2 / 16))
+            _, high = explored(
+                z,
+                placed,
+                w,
+                shape,
+                beta,
+                net,
+                stars,
+                ordinates,
+                child,
+                sides,
+                -1,
+                True,
+                least,
+                steps,
+            )
+            beyond = max(beyond, high)
+        if beyond > 0:
+            to[i, 0] = -math.sqrt(to[i, 0] ** 2 + beyond**2)
+            to[i, 1] = math.sqrt(to[i, 1] ** 2 + beyond**2)

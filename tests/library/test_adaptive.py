@@ -5,7 +5,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
+from pns_common.adaptive.certificate import slabs
+from pns_common.adaptive.parts import Levels, Part
+from pns_common.mesh.rows import unit
 from pns_common.mesh.topology import EdgeClass
+from pns_common.parallel import Blocks
 from pns_common.schemes.limit import limit_normals
 from tests.support.meshes import (
     bent,
@@ -114,6 +118,29 @@ def test_no_point_of_the_limit_surface_is_farther_than_said(name, scheme, tolera
         assert away.max(initial=0) <= made.distances[row] + 1e-12 * diagonal(mesh)
 
 
+@pytest.mark.parametrize("name", ["bumps", "block", "drum"])
+@pytest.mark.parametrize("enough", [0.0, 0.05])
+def test_no_patch_is_farther_beyond_a_side_than_said(name, enough):
+    mesh = shape(name)
+    count, every = mesh.face_count, np.arange(mesh.face_count)
+    dense = refine(mesh, "loop", 5, creases=None).mesh
+    part = Part(0, mesh.topology(), mesh.vertices, np.arange(len(mesh.vertices)), every, every >= 0)
+    triangles, all_sides = dense.vertices[mesh.faces], np.ones((count, 3), dtype=bool)
+    levels = Levels(loop().base, Blocks(), 6, None)
+    low, high, _ = slabs(part, every, triangles, all_sides, levels, 0, enough).T
+    points = dense.vertices[dense.faces.reshape(count, -1)]
+    a, b, c = triangles.swapaxes(0, 1)
+    normal = unit(np.cross(b - a, c - a))
+    height = np.einsum("fpi,fi->fp", points - a[:, None], normal)
+    out = np.zeros_like(height)
+    for one, other in ((a, b), (b, c), (c, a)):
+        across = unit(np.cross(other - one, normal))
+        out = np.maximum(out, np.einsum("fpi,fi->fp", points - one[:, None], across))
+    away = np.hypot(height, out).max(axis=1)
+    assert out.max() > 0
+    assert (away <= np.maximum(-low, high) + 1e-12).all()
+
+
 def heights(made, points, row):
     """Return distances of points from the plane of a face; if that is a half, of those over it."""
     a, b, c = made.mesh.vertices[made.mesh.faces[row]]
@@ -192,6 +219,16 @@ def test_a_mirrored_mesh_becomes_the_mirrored_result(scheme, goal):
     made = refine(Mesh(points, faces), scheme, LEVELS, **goal).mesh
     there = refine(Mesh(points * flip, faces[:, ::-1]), scheme, LEVELS, **goal).mesh
     assert same_faces(made, Mesh(there.vertices * flip, there.faces[:, ::-1]))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+@pytest.mark.parametrize("most", [100, 320, 1000])
+def test_ties_are_split_together_or_not_at_all(scheme, most):
+    mesh, flip = drum(), np.array([-1.0, 1.0, 1.0])
+    made = refine(mesh, scheme, max_faces=most).mesh
+    there = refine(Mesh(mesh.vertices * flip, mesh.faces[:, ::-1]), scheme, max_faces=most).mesh
+    assert same_faces(made, Mesh(there.vertices * flip, there.faces[:, ::-1]))
+    assert made.face_count <= most
 
 
 @pytest.mark.parametrize("goal", [{"tolerance": "0.1%"}, {"angle": 1}])
