@@ -42,6 +42,8 @@ from pns_common.schemes.matrix import SubdivisionMatrix, mask_matrix, product
 SMALLER, BELOW = 1 / 4, 1 - 1e-9
 # Errors whose ratio is this near to 1 are equal: networks compute in single precision.
 EQUAL = 1e-4
+# Faces of equal errors are split together if so large a share of the faces asked for is reached.
+ENOUGH = 0.98
 # Shares of the work, roughly: until the learned level is there, until trees have all their faces
 # but those that closing adds, and until those to split are chosen.
 LEARNED, GROWN, CHOSEN = 0.15, 0.65, 0.75
@@ -330,34 +332,55 @@ def _with_so_many(start: Start, shares: Shares) -> Tree:
         known = tree.measured
         del tree
         tree = start.grow(threshold, known=known)
-    (order, errors), turn = _worst_first(tree), 0
-    low, fewer = 0, tree.layers[0].part.topology.face_count
-    high, more = len(order), made
-    if made <= most:
-        low = high
+    order, errors = _worst_first(tree)
+    ends = _ends_of_ties(errors)
     shares.part(GROWN, CHOSEN)
-    while high - low > 1:
-        # Faces are nearly proportional to splits; each third time the middle, so that it ends.
-        turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
-        middle = min(max(low + int(share * (high - low)), low + 1), high - 1)
-        made = tree.count(tree.closed(_flagged(tree, order[: _untied(errors, middle)])))
-        if made <= most:
-            low, fewer = middle, made
-        else:
-            high, more = middle, made
-        shares.reach(1 - (high - low).bit_length() / len(order).bit_length(), fewer)
+    chosen, count = _as_many(tree, order, ends, most, shares)
+    if count < ENOUGH * most and len(ends) < len(order):
+        chosen, _ = _as_many(tree, order, np.arange(1, len(order) + 1), most, shares)
     shares.part(CHOSEN, 1.0)
-    first = _flagged(tree, order[: _untied(errors, low)])
-    forced, known = tree.codes(tree.closed(first)), tree.measured
+    forced, known = tree.codes(tree.closed(_flagged(tree, order[:chosen]))), tree.measured
     del tree
     return start.grow(threshold, forced, only=True, known=known)
 
 
-def _untied(errors: Float[np.ndarray, " N"], count: int) -> int:
-    """Return how many of the first errors are split: those that are equal together, or not."""
-    if count == len(errors):
-        return count
-    return int(np.argmax(errors <= errors[count] * (1 + EQUAL)))
+def _as_many(
+    tree: Tree,
+    order: Integer[np.ndarray, "N 2"],
+    ends: Integer[np.ndarray, " M"],
+    most: int,
+    shares: Shares,
+) -> tuple[int, int]:
+    """Return the largest of some numbers of first splits that makes so many faces at most.
+
+    0 is one of them. Returns also how many faces it makes.
+    """
+
+    def count(number: int) -> int:
+        splits = order[: ends[number - 1]] if number else order[:0]
+        return tree.count(tree.closed(_flagged(tree, splits)))
+
+    low, fewer, turn = 0, tree.layers[0].part.topology.face_count, 0
+    high, more = len(ends), count(len(ends))
+    if more <= most:
+        low, fewer = high, more
+    while high - low > 1:
+        # Faces are nearly proportional to splits; each third time the middle, so that it ends.
+        turn, share = turn + 1, (most - fewer) / (more - fewer) if turn % 3 < 2 else 1 / 2
+        middle = min(max(low + int(share * (high - low)), low + 1), high - 1)
+        made = count(middle)
+        if made <= most:
+            low, fewer = middle, made
+        else:
+            high, more = middle, made
+        shares.reach(1 - (high - low).bit_length() / len(ends).bit_length(), fewer)
+    return int(ends[low - 1]) if low else 0, fewer
+
+
+def _ends_of_ties(errors: Float[np.ndarray, " N"]) -> Integer[np.ndarray, " M"]:
+    """Return where errors, largest first, end that are equal."""
+    falls = errors[1:] * (1 + EQUAL) < errors[:-1]
+    return np.append(np.flatnonzero(falls) + 1, len(errors)) if len(errors) else np.zeros(0, int)
 
 
 def _largest_left(tree: Tree, deepest: int) -> float:
