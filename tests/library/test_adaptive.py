@@ -223,12 +223,12 @@ def test_a_mirrored_mesh_becomes_the_mirrored_result(scheme, goal):
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 @pytest.mark.parametrize("most", [100, 320, 1000])
-def test_ties_are_split_together_or_not_at_all(scheme, most):
+def test_equal_errors_are_split_together_within_two_percent_of_the_number(scheme, most):
     mesh, flip = drum(), np.array([-1.0, 1.0, 1.0])
     made = refine(mesh, scheme, max_faces=most).mesh
     there = refine(Mesh(mesh.vertices * flip, mesh.faces[:, ::-1]), scheme, max_faces=most).mesh
     assert same_faces(made, Mesh(there.vertices * flip, there.faces[:, ::-1]))
-    assert made.face_count <= most
+    assert 0.98 * most <= made.face_count <= most
 
 
 @pytest.mark.parametrize("goal", [{"tolerance": "0.1%"}, {"angle": 1}])
