@@ -335,7 +335,7 @@ class Start:
     def _measure_some(
         self,
         part: Part,
-        places: Float[np.ndarray, "N 3"],
+        places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         rows: Integer[np.ndarray, " N"],
         to: Measures,
