@@ -258,7 +258,7 @@ def converted(
         written = _of_gltf(done.glb, done.report, target, limits)
         return replace(written, seconds=done.timings, faces_in=done.faces_in, parents=done.parents)
     with stages.stage("read", 0.0, 0.1):
-        mesh, scheme = _taken(read_within(data, kind, limits), options, model, limits)
+        mesh, scheme = _taken(read_within(data, kind, limits), target, options, model, limits)
     if target in GLTF_KINDS:
         mesh = with_group_normals(mesh)
         if NORMAL not in mesh.layers and options.normals == "auto":
@@ -304,12 +304,17 @@ def _of_mesh(
 
 
 def _taken(
-    mesh: MeshFile, options: Options, model: Model | None, limits: Limits
+    mesh: MeshFile, target: str, options: Options, model: Model | None, limits: Limits
 ) -> tuple[MeshFile, Scheme]:
-    """Return the mesh to refine, of triangles or of polygons, and the scheme for it."""
+    """Return the mesh to refine, of triangles or of polygons, and the scheme for it.
+
+    What is written as triangles has so many of them as are asked for.
+    """
     # Cutting leaves no fewer.
     check_faces(mesh, options, limits)
-    if not options.learns or (mesh.sizes != 3).any():
+    counted = options.max_faces is not None and target in (*GLTF_KINDS, *OF_TRIANGLES)
+    quads = options.scheme == "catmull-clark"
+    if quads or (not counted and (not options.learns or (mesh.sizes != 3).any())):
         scheme = polygon_scheme(options, model)
         if scheme is not None:
             return in_star_shaped_pieces(mesh), scheme
@@ -319,6 +324,7 @@ def _taken(
 def predicted_faces(
     data: bytes,
     kind: str,
+    target: str,
     options: Options,
     model: Model | None,
     limits: Limits,
@@ -341,7 +347,7 @@ def predicted_faces(
         return faces, options.faces_after(faces)
     mesh = read_within(data, kind, limits)
     if options.goals:
-        taken, scheme = _taken(mesh, options, model, limits)
+        taken, scheme = _taken(mesh, target, options, model, limits)
         _, report = refine_mesh_file(taken, scheme, options, limits)
         return len(mesh.sizes), report["totals"]["faces"]
     check_cost(mesh, options, limits)

@@ -181,7 +181,7 @@ def _plan(task: Task) -> Row:
         return Row(task.url, task.output, SKIPPED, input_sha256=digest, bytes_in=len(data))
     with _refining(task) as model:
         asked = task.options, model, task.limits, siblings
-        faces_in, faces = predicted_faces(data, task.kind, *asked)
+        faces_in, faces = predicted_faces(data, task.kind, task.target, *asked)
     return Row(
         task.url,
         task.output,

@@ -65,3 +65,10 @@ def test_polygons_of_a_gltf_are_refused_with_a_goal():
     glb = refined(ROOF, target="glb", levels=1).content
     with pytest.raises(InvalidParameter, match="stay triangles"):
         refined(glb, "glb", "glb", tolerance="2%", scheme="catmull-clark")
+
+
+@pytest.mark.parametrize("target", ["glb", "stl", "obj"])
+def test_as_many_faces_as_are_asked_for_are_those_that_are_written(target):
+    made = refined(ROOF, target=target, max_faces=200)
+    written = made.faces if target == "obj" else made.triangles
+    assert 150 < written <= 200
