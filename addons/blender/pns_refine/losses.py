@@ -46,6 +46,10 @@ def losses(obj: bpy.types.Object, reading: Reading, refined: Refined) -> list[st
             snapshot.has_polygons and refined.topology.triangles,
             "Faces of more than three corners became triangles",
         ),
+        (
+            mesh.uv_layers and "adaptive" in refined.report,
+            "UV maps are straight in every face, whatever UV Smooth says",
+        ),
         (loose, f"{loose:,} edges without faces are kept as they are, not refined"),
         (voted, f"New points and corners have the value of most parents: {listed(voted)}"),
         (edges, f"Edges new inside faces have the value zero: {listed(edges)}"),

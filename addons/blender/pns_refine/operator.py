@@ -311,8 +311,9 @@ def draw_forecast(
         "LEVELS": f"{made:,} faces from {faces:,}",
         "FACES": f"At most {made:,} faces, from {faces:,}",
     }.get(settings.detail, f"As many faces as that takes, from {faces:,}")
-    if settings.detail != "LEVELS" and not all(map(is_triangles, objects)):
-        text = "Detail is for triangles: quads are cut everywhere"
+    whole = keeps_polygons(settings) and not all(map(is_triangles, objects))
+    if settings.detail == "ANGLE" and whole:
+        text = "Angle is for triangles: choose another Detail for quads"
     layout.label(text=text, icon="INFO")
     if made > MANY:
         text = f"More than {MANY:,} faces: this takes long, and much memory"

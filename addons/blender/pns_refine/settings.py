@@ -66,22 +66,14 @@ class Settings:
         description="Where faces are cut",
         items=(
             ("LEVELS", "Everywhere", "Each face as often as Levels says"),
-            (
-                "FACES",
-                "Faces at Most",
-                "Where the surface bends most, up to a number of faces. For triangles",
-            ),
+            ("FACES", "Faces at Most", "Where the surface bends most, up to a number of faces"),
             (
                 "TOLERANCE",
                 "Tolerance",
                 "Where faces would be farther from the smooth surface than "
-                "a share of the mesh's size. For triangles",
+                "a share of the mesh's size",
             ),
-            (
-                "ANGLE",
-                "Angle",
-                "Where shading turns more over a face than an angle. For triangles",
-            ),
+            ("ANGLE", "Angle", "Where shading turns more than an angle. For triangles alone"),
         ),
         default="LEVELS",
     )

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from addons.blender.pns_refine.refining.snapshot import Layer, Snapshot
+from pns_common import Mesh
 from pns_common.carry import rules
-from tests.support.polygons import CUBE, CUBE_FACES
+from pns_common.mesh.mesh import fans
+from pns_common.mesh.topology import following
+from tests.support.polygons import CUBE, CUBE_FACES, cylinder
 
 CUBE_POINTS, CUBE_SIDES = 2 * CUBE - 1, np.array(CUBE_FACES)
 
@@ -36,6 +39,12 @@ def grid(cells, *layers):
     return snapshot(points.reshape(-1, 3), quads, 0.0, layers)
 
 
+def drum():
+    """Seven quads between two lids of seven corners."""
+    points, faces = cylinder()
+    return snapshot(points, faces)
+
+
 def cut(shape):
     """The same mesh, whose polygons are the triangles."""
     count = len(shape.triangles)
@@ -43,18 +52,18 @@ def cut(shape):
     return replace(shape, corners=corners, polygons=np.arange(count), polygon_corners=starts)
 
 
-def snapshot(points, quads, sharpness=0.0, layers=()):
-    """The snapshot of these quads, each cut along the diagonal from its first corner."""
-    first = 4 * np.arange(len(quads))[:, None]
-    corners = (first[:, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
-    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges = np.unique(np.sort(sides, axis=1), axis=0)
+def snapshot(points, faces, sharpness=0.0, layers=()):
+    """The snapshot of these faces, each cut along the diagonals from its first corner."""
+    mesh = Mesh(points, faces)
+    corners, polygons = fans(mesh.offsets)
+    sides = np.stack([mesh.corners, mesh.corners[following(mesh.offsets)]], axis=1)
+    edges = np.unique(np.sort(sides, axis=1), axis=0).astype(np.int64)
     return Snapshot(
         points=points,
-        triangles=quads.reshape(-1)[corners],
+        triangles=mesh.corners[corners].astype(np.int64),
         corners=corners,
-        polygons=np.repeat(np.arange(len(quads)), 2),
-        polygon_corners=4 * np.arange(len(quads) + 1),
+        polygons=polygons,
+        polygon_corners=mesh.offsets,
         edges=edges,
         crease_sharpness=np.broadcast_to(np.asarray(sharpness, float), len(edges)).copy(),
         vertex_sharpness=np.zeros(len(points)),

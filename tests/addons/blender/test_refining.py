@@ -13,10 +13,11 @@ from addons.blender.pns_refine.refining.creases import crease_of, crease_sharpne
 from addons.blender.pns_refine.refining.job import Job, StoppedError
 from pns_common import Creases, MeshError, catmull_clark, load_model, loop, pns, refine
 from pns_common.carry import rules
-from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, cut, grid, layer, switch
+from pns_common.mesh.rows import dot, norm
+from tests.addons.blender.quads import CUBE_POINTS, CUBE_SIDES, cube, cut, drum, grid, layer, switch
 from tests.addons.blender.quads import snapshot as quads
 
-GENERAL = load_model()
+GENERAL, NEAR = load_model(), {"tolerance": "1%"}
 
 
 def bent():
@@ -29,15 +30,17 @@ def bent():
 
 def kinds(shape, levels=2):
     """Quads over Catmull–Clark, triangles over Loop, and where they bend, without correction."""
-    triangles = cut(shape)
+    faces = len(shape.triangles) * 4**levels
     return {
         "quads": (shape, Choice(GENERAL, levels, budget=0.0)),
         "cut": (shape, Choice(None, levels)),
-        "goal": (triangles, Choice(None, levels, max_faces=len(triangles.triangles) * 4**levels)),
+        "goal": (shape, Choice(GENERAL, levels, budget=0.0, max_faces=faces // 2)),
+        "triangles": (cut(shape), Choice(None, levels, max_faces=faces)),
+        "cut to a goal": (shape, Choice(None, levels, max_faces=faces)),
     }
 
 
-KINDS = ["quads", "cut", "goal"]
+KINDS = ["quads", "cut", "goal", "triangles", "cut to a goal"]
 
 
 def named(made, name):
@@ -142,13 +145,48 @@ def test_a_goal_is_the_librarys_and_what_it_cannot_do_is_said():
         expected = refine(shape.control(whole=False).mesh, loop(), **goal)
         np.testing.assert_array_equal(made.points, expected.mesh.vertices)
         np.testing.assert_array_equal(made.topology.corners, expected.mesh.corners)
-    for refused, limit, words in (
-        (cube(), True, r"quads or larger faces.*Ctrl T"),
-        (cut(cube(2.5)), True, "set them to 1"),
-        (shape, False, "On Limit Surface"),
+    for whole, goal in ((grid(6), {"max_faces": 400}), (drum(), {"tolerance": "1%"})):
+        made = compute(whole, Choice(GENERAL, 2, **goal))
+        expected = refine(whole.control(whole=True).mesh, "pns", creases="auto", **goal)
+        np.testing.assert_array_equal(made.points, expected.mesh.vertices)
+        np.testing.assert_array_equal(made.topology.offsets, expected.mesh.offsets)
+    many = {"max_faces": 400}
+    for refused, choice, words in (
+        (cube(), Choice(GENERAL, 2, angle=10.0), r"Catmull–Clark.*Tolerance.*Ctrl T"),
+        (cut(cube(2.5)), Choice(None, 2, **many), "set them to 1"),
+        (shape, Choice(None, 2, limit=False, **many), "On Limit Surface"),
     ):
         with pytest.raises(MeshError, match=words):
-            compute(refused, Choice(None, 2, max_faces=400, limit=limit))
+            compute(refused, choice)
+    assert compute(cube(), Choice(None, 2, angle=10.0)).topology.triangles
+
+
+def test_lids_stay_whole_with_all_that_they_carry():
+    """A drum of quads and two lids of seven corners, that get new ones on their rims."""
+    shape = drum()
+    corners = np.zeros((shape.polygon_corners[-1], 3))
+    corners[shape.corners] = shape.points[shape.triangles]
+    rims = np.ptp(shape.points[shape.edges][..., 2], axis=1) == 0
+    layers = (
+        layer("CORNER", rules.smooth, corners, "corners"),
+        layer("FACE", rules.old, np.arange(9)[:, None], "faces"),
+        switch("seam", "EDGE", rims),
+    )
+    sharp = replace(shape, layers=layers, crease_sharpness=np.where(rims, np.inf, 0))
+    made = compute(sharp, Choice(GENERAL, 2, budget=0.0, tolerance="0.5%"))
+    sizes = np.diff(made.topology.offsets)
+    assert sizes[:2].min() > 7
+    assert (sizes[2:] == 4).all()
+    np.testing.assert_array_equal(named(made, "faces")[:2, 0], [0, 1])
+    assert named(made, "seam").sum() == (made.crease_sharpness > 0).sum() == sizes[:2].sum()
+    # On both sides of the rims values are those of the control mesh's sides.
+    of_vertex = np.empty((len(made.points), 3))
+    of_vertex[made.topology.corners] = named(made, "corners")
+    np.testing.assert_allclose(named(made, "corners"), of_vertex[made.topology.corners], atol=1e-12)
+    normals, walls = named(made, "normals"), slice(sizes[:2].sum(), None)
+    np.testing.assert_allclose(np.abs(normals[: walls.start]).min(axis=0), [0, 0, 1], atol=1e-6)
+    out = at_corners(made)[walls] * [1, 1, 0]
+    np.testing.assert_allclose(dot(normals[walls], out), norm(out), atol=0.02)
 
 
 # --- what comes along -----------------------------------------------------------------------------
@@ -170,8 +208,8 @@ def test_attributes_that_are_the_positions_follow_them(kind):
     np.testing.assert_allclose(made.offsets[1], 1)
     np.testing.assert_allclose(made.groups, np.clip(made.points[:, :1], 0, 1), atol=1e-12)
     inside = (np.abs(at_corners(made)[:, :2]) < 0.6).all(axis=1)
-    # To a goal corners are linear in each face.
-    atol = 0.04 if kind == "goal" else 1e-9
+    # To a goal corners are linear in each face, or bilinear.
+    atol = 1e-9 if kind in ("quads", "cut") else 0.04
     np.testing.assert_allclose(named(made, "corners")[inside], at_corners(made)[inside], atol=atol)
 
 
@@ -257,7 +295,8 @@ def test_edges_without_faces_stay_and_vertices_that_only_look_joined_are_counted
 
 
 @pytest.mark.parametrize(
-    ("shape", "goal"), [(cube(), {}), (cut(cube()), {}), (cut(cube()), {"tolerance": "1%"})]
+    ("shape", "goal"),
+    [(cube(), {}), (cut(cube()), {}), (cube(), NEAR), (cut(cube()), NEAR)],
 )
 def test_a_flat_cube_comes_out_smooth_between_marked_edges(shape, goal):
     flat = switch("sharp_face", "FACE", np.ones(len(shape.polygon_corners) - 1))

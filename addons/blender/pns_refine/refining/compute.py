@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -62,9 +63,9 @@ def compute(snapshot: Snapshot, choice: Choice, progress: Progress = lambda shar
     Raises:
         PnsError: the mesh cannot be refined so, or the model fails.
     """
-    if choice.goals:
-        _check_goal(snapshot, choice)
     scheme = scheme_of(snapshot, choice)
+    if choice.goals:
+        _check_goal(snapshot, choice, polygons=scheme.base.polygons)
     control = snapshot.control(whole=scheme.base.polygons)
     creases = marked = marked_creases(snapshot, control, choice)
     shows = choice.crease_lines and scheme.creases.finds
@@ -97,7 +98,7 @@ def compute(snapshot: Snapshot, choice: Choice, progress: Progress = lambda shar
     layers = shaded(layers, surface.sharp, len(loose), normals, smooth=shows)
     topology, old, count = surface.topology, len(snapshot.points), len(made.mesh.vertices)
     edges = np.concatenate([topology.edges, snapshot.edges[loose]])
-    levels = np.inf if choice.goals else choice.levels
+    levels = sys.maxsize if choice.goals else choice.levels
     return Refined(
         points=made.mesh.vertices,
         topology=topology,
@@ -128,11 +129,11 @@ def scheme_of(snapshot: Snapshot, choice: Choice) -> Scheme:
     return pns(model, budget)
 
 
-def _check_goal(snapshot: Snapshot, choice: Choice) -> None:
+def _check_goal(snapshot: Snapshot, choice: Choice, *, polygons: bool) -> None:
     """Check that a mesh can be refined to a goal. Raises MeshError."""
-    if snapshot.has_polygons:
-        text = "Detail is for triangles, and this mesh has quads or larger faces, which are refined"
-        raise MeshError(f"{text} by whole levels: choose Levels, or triangulate it (Ctrl T)")
+    if polygons and choice.angle is not None:
+        text = "Angle is for triangles, not for Catmull–Clark's quads: choose Tolerance"
+        raise MeshError(f"{text} or Faces at Most, or triangulate the mesh (Ctrl T)")
     if not choice.limit:
         raise MeshError("Detail puts vertices on the limit surface: switch On Limit Surface on")
     sharpness = snapshot.crease_sharpness
@@ -171,9 +172,9 @@ def _carried(
     return surface.at_corners(replace(layer, values=values, keep=keep, same=same))
 
 
-def _left(sharpness: Float[np.ndarray, " N"], levels: float) -> Float[np.ndarray, " N"]:
+def _left(sharpness: Float[np.ndarray, " N"], levels: int) -> Float[np.ndarray, " N"]:
     """Return what is left of sharpness after so many levels."""
-    return np.where(np.isinf(sharpness), np.inf, np.maximum(sharpness - levels, 0.0))
+    return np.maximum(sharpness - levels, 0.0)
 
 
 def _creases_left(
@@ -181,7 +182,7 @@ def _creases_left(
     topology: Topology,
     parents: Int[np.ndarray, " E"],
     loose: Int[np.ndarray, " L"],
-    levels: float,
+    levels: int,
 ) -> Float[np.ndarray, " E"]:
     """Return what is left of each edge's sharpness; edges without faces keep theirs."""
     own = np.append(_left(snapshot.crease_sharpness, levels), 0.0)[parents]

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from pns_common import Refinement
+from pns_common.adaptive.polygon_refinement import PolygonRefinement
 from pns_common.adaptive.refine import AdaptiveRefinement
 from pns_common.carry import rules
 from pns_common.carry.carried import (
@@ -22,8 +23,10 @@ from pns_common.carry.carried import (
     refine_column,
     scaled_to_unit,
 )
-from pns_common.mesh.normals import angle_weighted_normals, measure_faces, smooth_fans
-from pns_common.mesh.topology import MOSTLY_SHARP, Topology
+from pns_common.mesh.normals import measure_faces
+from pns_common.mesh.rows import cross, dot, norm
+from pns_common.mesh.sectors import find_sectors
+from pns_common.mesh.topology import MOSTLY_SHARP, Topology, following
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes.limit import limit_normals
 
@@ -60,7 +63,10 @@ class WholeLevels:
 
 
 class SeveralLevels:
-    """Faces are cut only where the surface bends. At corners values are linear in each face."""
+    """Faces are cut only where the surface bends.
+
+    At corners values are linear in triangles, and bilinear in the quads that polygons become first.
+    """
 
     def __init__(self, made: AdaptiveRefinement) -> None:
         self._made, cage = made, made.control.topology
@@ -72,10 +78,13 @@ class SeveralLevels:
 
     def _side_parents(self, cage: Topology) -> Int[np.ndarray, " E"]:
         made, topology = self._made, self.topology
+        parents = np.full(len(topology.edges), -1, dtype=np.int64)
+        if isinstance(made, PolygonRefinement):
+            parents[topology.corner_edges] = made.edge_parents
+            return parents
         both = np.stack([made.weights, np.roll(made.weights, -1, axis=1)])
         # Of a point on a side the weight of the corner opposite is 0.
         rows, corner, opposite = np.nonzero((both == 0).all(axis=0))
-        parents = np.full(len(topology.edges), -1, dtype=np.int64)
         sides = cage.face_edges[made.face_parents[rows], (opposite + 1) % 3]
         parents[topology.face_edges[rows, corner]] = sides
         return parents
@@ -101,18 +110,27 @@ class SeveralLevels:
         if column.rule in BLENDING:
             carried = made.at_corners(values).reshape(-1, values.shape[1])
             return scaled_to_unit(carried) if column.unit else carried
+        if isinstance(made, PolygonRefinement):
+            return values[made.nearest_corners]
         nearest = 3 * made.face_parents[:, None] + made.weights.argmax(axis=2)
         return values[nearest.reshape(-1)]
 
     def normals(self, sharp: Bool[np.ndarray, " E"]) -> Float[np.ndarray, "C 3"]:
         """Return the limit surface's normal at each corner; along sharp edges that of its side."""
-        faces, points = self._made.mesh.faces, self._made.mesh.vertices
-        pairs, blocks = self.topology.edges[sharp], Blocks(available_threads())
-        fans = smooth_fans(faces, len(points), pairs)
-        sides = angle_weighted_normals(points, faces, fans, int(fans.max()) + 1, blocks)[fans]
-        own = np.asarray(self._made.normals)[faces]
-        several = np.isin(faces, pairs) | ~own.any(axis=2)
-        return np.where(several[..., None], sides, own).reshape(-1, 3)
+        points, mesh, blocks = self._made.mesh.vertices, self.topology, Blocks(available_threads())
+        fans = find_sectors(mesh.with_creases(np.flatnonzero(sharp)).connectivity).of_corner
+        faces, _ = measure_faces(points, mesh, blocks, areas=False)
+        # Weighted by their angles: however a flat side is cut, it weighs the same.
+        after = following(mesh.offsets)
+        leave = points[mesh.corners[after]] - points[mesh.corners]
+        enter = np.empty_like(leave)
+        enter[after] = -leave
+        angles = np.arctan2(norm(cross(leave, enter)), dot(leave, enter))[:, None]
+        weighted = angles * faces[mesh.face_of(np.arange(len(after)))]
+        sides = np.stack([np.bincount(fans, column) for column in weighted.T], axis=1)
+        own = np.asarray(self._made.normals)[mesh.corners]
+        several = np.isin(mesh.corners, mesh.edges[sharp]) | ~own.any(axis=1)
+        return np.where(several[:, None], scaled_to_unit(sides)[fans], own)
 
 
 Surface = WholeLevels | SeveralLevels

@@ -264,6 +264,50 @@ def corners_of(mesh):
     return places, numbers(mesh.uv_layers[0].data, "uv", 2)
 
 
+def test_polygons_to_a_goal_keep_all_that_they_carry():
+    """A drum whose rims are sharp: its two lids stay whole."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=12, calc_uvs=True)
+    obj = bpy.context.object
+    obj.data.materials.append(bpy.data.materials.new("wall"))
+    obj.data.materials.append(bpy.data.materials.new("lid"))
+    for face in obj.data.polygons:
+        face.material_index = int(len(face.vertices) > 4)
+    crease = obj.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+    for edge, mark in zip(obj.data.edges, crease.data, strict=True):
+        heights = {round(obj.data.vertices[number].co.z) for number in edge.vertices}
+        mark.value = edge.use_seam = len(heights) == 1
+    group = obj.vertex_groups.new(name="Top")
+    group.add([v.index for v in obj.data.vertices if v.co.z > 0], 1.0, "REPLACE")
+    obj.shape_key_add(name="Basis")
+    for point in obj.shape_key_add(name="Up").points:
+        point.co.z += 1
+    new = refined(obj, detail="TOLERANCE", tolerance=0.2)
+    made = new.data
+    lids = [face for face in made.polygons if len(face.vertices) > 4]
+    assert [face.material_index for face in lids] == [1, 1]
+    assert sum(face.material_index for face in made.polygons) == 2
+    count = sum(len(face.vertices) for face in lids)
+    assert count > 24
+    assert sum(edge.use_seam for edge in made.edges) == count
+    assert (numbers(made.attributes["crease_edge"].data) == 1).sum() == count
+    basis, up = (numbers(block.points, "co", 3) for block in made.shape_keys.key_blocks)
+    np.testing.assert_allclose(up - basis, np.tile([0, 0, 1], (len(basis), 1)), atol=1e-5)
+    for vertex in made.vertices:
+        weight = sum(member.weight for member in vertex.groups)
+        assert weight == pytest.approx((vertex.co.z + 1) / 2, abs=1e-5)
+    normals = numbers(made.corner_normals, "vector", 3)
+    heights = points_of(made)[numbers(made.loops, "vertex_index").astype(int).ravel(), 2]
+    uv = numbers(made.uv_layers[0].data, "uv", 2)
+    for face in made.polygons:
+        corners = list(face.loop_indices)
+        if face.material_index:
+            assert np.abs(normals[corners, 2]).min() > 0.999
+        else:
+            np.testing.assert_allclose(uv[corners, 1], 0.75 + heights[corners] / 4, atol=1e-5)
+    assert "triangles" not in notes(new)
+    assert "whatever UV Smooth says" in notes(new)
+
+
 def test_every_loss_is_named_and_loose_parts_stay():
     points = [(0, 0, 0), (1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (3, 0, 0), (4, 0, 0)]
     obj = placed("Many", points, [(0, 1, 2, 3, 4)], [(5, 6)])

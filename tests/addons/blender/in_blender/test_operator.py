@@ -18,7 +18,6 @@ from scene import (
     grid,
     linked,
     numbers,
-    placed,
     points_of,
     refined,
     shown_here,
@@ -39,6 +38,8 @@ TURNED = {"detail": "ANGLE", "angle": np.radians(20)}
         ({"limit": False}, GENERAL, {"limit": False}),
         ({"crease_angle": 0.2, "levels": 1}, GENERAL, {"levels": 1, "creases": 0.2}),
         ({"scheme": "LOOP"}, "loop", {}),
+        (FACES, GENERAL, {"max_faces": 1000, "levels": None}),
+        (NEAR, GENERAL, {"tolerance": "0.5%", "levels": None}),
         (FACES | {"scheme": "LOOP"}, "loop", {"max_faces": 1000, "levels": None, "creases": None}),
         (NEAR | {"scheme": "LOOP"}, "loop", {"tolerance": "0.5%", "levels": None, "creases": None}),
         (TURNED | {"scheme": "LOOP"}, "loop", {"angle": 20, "levels": None, "creases": None}),
@@ -52,10 +53,6 @@ def test_positions_are_those_of_the_library(settings, scheme, expected):
         mesh.calc_loop_triangles()
         faces = numbers(mesh.loop_triangles, "vertices", 3).astype(int).tolist()
     control = pns_common.Mesh(points_of(mesh), faces)
-    if settings.get("detail"):
-        with pytest.raises(RuntimeError, match="triangulate it"):
-            refined(obj, **settings)
-        obj = placed("Triangles", points_of(mesh).tolist(), faces)
     if expected.get("creases"):
         bent = pns_common.sharp_edges(control, np.degrees(expected["creases"]))
         expected = expected | {"creases": pns_common.Creases(bent, learned=True, levels=6)}
@@ -63,6 +60,11 @@ def test_positions_are_those_of_the_library(settings, scheme, expected):
     points = pns_common.refine(control, scheme, **{"levels": 2} | expected).mesh.vertices
     np.testing.assert_allclose(points_of(made), points, rtol=0, atol=1e-6)
     assert ("adaptive" in made.pns_result.report) == ("detail" in settings)
+
+
+def test_an_angle_is_refused_for_quads():
+    with pytest.raises(RuntimeError, match=r"Angle is for triangles.*Tolerance.*Ctrl T"):
+        refined(cube(), **TURNED)
 
 
 def test_the_original_stays_with_the_result_beside_it_or_gets_it():

@@ -63,10 +63,12 @@ def test_the_button_forecasts_and_warns():
     assert "Rounder" not in drawn()
     last.detail = "FACES"
     assert "max_faces" in drawn()
-    assert "quads are cut everywhere" in drawn()
+    assert "At most 20,000 faces, from 6" in drawn()
+    last.detail = "ANGLE"
+    assert "Angle is for triangles" in drawn()
     obj.modifiers.new("Cut", "TRIANGULATE")
     bpy.ops.object.modifier_apply(modifier="Cut")
-    assert "At most 20,000 faces, from 12" in drawn()
+    assert "As many faces as that takes, from 12" in drawn()
     last.detail, last.levels = "LEVELS", 6
     grid(40)
     assert "More than 1,000,000" in drawn()
