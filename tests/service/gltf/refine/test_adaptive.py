@@ -137,7 +137,6 @@ def test_data_of_other_libraries_follow():
         ({"max_faces": 0}, "max_faces"),
         ({"tolerance": "1", "uv": "smooth"}, "uv"),
         ({"tolerance": "1", "limit": False}, "limit"),
-        ({"tolerance": "1", "scheme": "catmull-clark"}, "scheme"),
         ({"max_faces": 100, "material": "a"}, "material"),
     ],
 )
@@ -151,6 +150,12 @@ def test_fewer_faces_than_there_are_is_an_error_that_says_how_many_are_possible(
     with pytest.raises(InvalidParameter, match="at least 8") as error:
         refined([octahedron()], max_faces=3)
     assert error.value.name == "max_faces"
+
+
+def test_triangles_of_a_gltf_do_not_become_polygons_of_several_levels():
+    with pytest.raises(InvalidParameter, match="stay triangles: leave scheme out") as error:
+        refined([octahedron()], scheme="catmull-clark", tolerance="1%")
+    assert error.value.name == "scheme"
 
 
 def test_what_whole_levels_would_make_is_no_reason_to_refuse():
