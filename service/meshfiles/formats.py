@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pns_common.mesh.mesh import fans
-from pns_common.mesh.rows import marked
+from pns_common.mesh.rows import distinct_rows, first_places, marked
 
 from ..changes import Change, counted
 from ..errors import UnreadableError, UnrefinableError
@@ -24,6 +24,7 @@ from .mesh_file import (
     OBJECT,
     SMOOTHING,
     UV,
+    Layer,
     MeshFile,
     as_fractions,
     shown,
@@ -219,6 +220,8 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
         words = as_fractions(layers[COLOUR].values).astype(np.float32)
         layers[COLOUR] = replace(layers[COLOUR], values=words)
     if kind == "obj" and COLOUR in layers:
+        if len(layers[COLOUR].values) > len(mesh.vertices):  # else vertices stay one
+            layers[COLOUR] = _each_once(layers[COLOUR])
         colours = as_fractions(layers[COLOUR].values)
         if (colours[:, 3:] < 1).any():
             lost["opacity of vertex colours"] = 1
@@ -252,6 +255,13 @@ def held(mesh: MeshFile, kind: str) -> tuple[MeshFile, list[Change]]:
     if not (form.double or (kind == "ply" and mesh.double)):
         changes += rounding_changes(mesh)
     return mesh, changes
+
+
+def _each_once(layer: Layer) -> Layer:
+    """Return a layer whose rows are equal where its values are, in single precision."""
+    number = distinct_rows(layer.values.astype(np.float32))
+    first = first_places(number, int(number.max(initial=-1)) + 1)
+    return Layer(layer.values[first], number[layer.rows])
 
 
 def rounding_changes(mesh: MeshFile) -> list[Change]:

@@ -194,10 +194,10 @@ def _refined_primitive(
     primitive, split = control.primitives[number], refined.split.part(control.shares[number])
     welded = control.weld.vertex_of[control.rows[number]]
     corners, row = distinct_corners(primitive, control.rows_at_corners(number), welded)
-    if shading is not None and np.array_equal(corners, shading.groups.rows.corners):
-        # Without seams inside of groups this split has been made.
-        rows = shading.groups.rows
-    else:
+    rows = None if shading is None else shading.groups.rows
+    alone = shading is not None and shading.groups.places.keys() == {number}
+    # Without seams inside of groups this split has been made.
+    if rows is None or not alone or not np.array_equal(corners, rows.corners):
         rows = split.rows(corners)
     vertex = split.vertices[rows.place]
     normals, exact, morphed = None, None, (None,) * len(refined.skin_and_morph.deltas)

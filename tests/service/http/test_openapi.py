@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import httpx2
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from service.gltf.read.container import read_glb
 from service.http.app import create_app
 from service.meshfiles.example import part_glb
+from service.options import Options
 from service.settings import Settings
 from service.workers.jobs import subdivide
 from tests.support import node_tools
@@ -56,6 +58,15 @@ def test_every_route_says_what_it_does_and_stands_on_the_page(document):
         # Without one it is made of the name.
         assert operation["summary"].lower() != operation["operationId"].replace("_", " "), name
         assert f"| `{name}" in page or f", `{name}" in page, name
+
+
+def test_choices_on_the_page_are_those_of_the_options():
+    page = (ROOT / "docs" / "reference" / "http.md").read_text()
+    for name, hint in get_type_hints(Options).items():
+        if get_origin(hint) is Literal:
+            row = re.search(rf"\| `{name}` \| (.*) \|", page)
+            assert row
+            assert {*re.findall("`([a-z-]+)`", row[1])} == {*get_args(hint)}, name
 
 
 def test_every_operation_says_what_any_route_may_answer(document):

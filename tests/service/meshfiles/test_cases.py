@@ -241,6 +241,14 @@ def test_vertex_colours_are_kept_and_blended_linearly(kind, target):
     np.testing.assert_allclose(found, sorted(ends + middles), atol=0.01)
 
 
+def test_coloured_vertices_of_an_obj_stay_one_at_seams_of_texture_coordinates():
+    points = "v 0 0 0 1 0 0\nv 1 0 0 0 .3 0\nv 1 1 0 0 0 .7\nv 0 1 1 1 1 1\n"
+    seam = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 5 5\nf 1/1 2/2 3/3\nf 1/5 3/3 4/4\n"
+    for goal in ({"levels": 2}, {"tolerance": "1%"}):
+        made = formats.read(refined((points + seam).encode(), "obj", "obj", **goal).content, "obj")
+        assert len(made.vertices) == len(np.unique(made.vertices, axis=0))
+
+
 def test_colours_up_to_255_are_fractions_of_it():
     float_ply = (
         COLOURED["ply"].replace("uchar red", "float red").replace("uchar green", "float green")

@@ -98,6 +98,20 @@ def test_normals_of_their_author_stay():
     assert (attributes["NORMAL"] == [0, 0, 1]).all(axis=1).mean() > 1 / 2
 
 
+@pytest.mark.parametrize("goal", [GOAL, {"max_faces": 150}])
+def test_primitives_without_normals_beside_others_are_refined_alike(goal):
+    one, shape = shaped(), shaped()
+    shape["POSITION"] = shape["POSITION"] * [0.5, 1, 2] + [10, 0, 0]
+    bare = [one, {**shape, "POSITION": shape["POSITION"].astype(np.float32)}]
+    up = np.tile([0.0, 0.0, 1.0], (len(one["POSITION"]), 1)).astype(np.float32)
+    made, plain = (
+        refined([{**one, **normals}, bare[1]], **goal).glb for normals in ({"NORMAL": up}, {})
+    )
+    for number in (0, 1):
+        mine, its = (files.primitive_of(glb, primitive=number) for glb in (made, plain))
+        np.testing.assert_array_equal(mine[1]["POSITION"][mine[0]], its[1]["POSITION"][its[0]])
+
+
 def test_mesh_files_are_refined_alike():
     shape, made = shaped(), library(**GOAL)
     rows = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in shape["POSITION"].astype(float).tolist())
@@ -137,6 +151,7 @@ def test_data_of_other_libraries_follow():
         ({"max_faces": 0}, "max_faces"),
         ({"tolerance": "1", "uv": "smooth"}, "uv"),
         ({"tolerance": "1", "limit": False}, "limit"),
+        ({"angle": 9.0, "scheme": "catmull-clark"}, "scheme"),
         ({"max_faces": 100, "material": "a"}, "material"),
     ],
 )
