@@ -32,7 +32,7 @@ from .columns import refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
 from .skin import SkinAndMorph
-from .split import Split, whole_levels
+from .split import Split, whole_levels, without_sides
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
@@ -50,8 +50,8 @@ class RefinedMesh:
         split: what the kept faces were split into.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
-        levels: the topologies that were refined, control mesh first; none for a union, and where
-            faces have several levels.
+        levels: the edges that were refined, as of `without_sides`, control mesh first; none for a
+            union, and where faces have several levels.
         still: (V,) vertices of the control mesh that no chosen face has; None: all are chosen.
     """
 
@@ -159,8 +159,10 @@ def refined_mesh(
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
     levels, base = made.topologies, made.scheme.base
-    split = whole_levels(control.faces, made.mesh.corners, options.levels, base, levels)
-    linear = ColumnRefinement(levels, base, options.limit, Blocks(available_threads()))
+    known = without_sides(levels, base)
+    split = whole_levels(control.faces, made.mesh.corners, options.levels, base, known)
+    blocks = Blocks(available_threads())
+    linear = ColumnRefinement(levels, base, options.limit, blocks, made.surface)
     return RefinedMesh(
         made.mesh,
         [made.report],
@@ -170,7 +172,7 @@ def refined_mesh(
         split,
         made.parents if traced else None,
         levels[0],
-        levels,
+        known,
     )
 
 
