@@ -262,7 +262,7 @@ class SeveralLevels:
 
 
 def without_sides(topologies: Sequence[Topology], base: BaseScheme) -> list[Topology]:
-    """Return topologies of what linear blends read, a fifth: ends of edges, corners of polygons.
+    """Return topologies of what linear blends read: ends of edges, and corners of polygons.
 
     The first keeps all of its corners.
     """
