@@ -86,22 +86,25 @@ class ColumnRefinement:
         base: the scheme.
         limit: whether the limit mask is applied at the end.
         blocks: how the work is shared.
+        surface: the topology of the refined mesh; None: it is made where it is needed.
     """
 
     topologies: Sequence[Topology]
     base: BaseScheme = LOOP
     limit: bool = False
     blocks: Blocks = field(default_factory=Blocks)
+    surface: Topology | None = None
 
     @cached_property
     def last(self) -> Topology:
         """The topology of the refined mesh."""
-        return self.base.split(self.topologies[-1], self.blocks)
+        return self.surface or self.base.split(self.topologies[-1], self.blocks)
 
     @property
     def count(self) -> int:
         """Number of refined vertices."""
-        return self.last.vertex_count
+        mesh = self.topologies[-1]
+        return mesh.vertex_count + len(mesh.edges) + mesh.face_count * self.base.polygons
 
     def __call__(self, columns: Real[np.ndarray, "V K"]) -> Float[np.ndarray, "W K"]:
         """Refine columns. Raises ParameterError unless there is one row for each vertex."""

@@ -202,7 +202,6 @@ def joined(
     parts: Sequence[Part],
     kept: Sequence[Bool[np.ndarray, " F"]],
     refined: Sequence[RefinedPrimitive],
-    levels: int,
     parents: SubdivisionMatrix | None,
 ) -> MeshFile:
     """Return refined parts as one mesh, in the order of the file's faces.
@@ -213,10 +212,7 @@ def joined(
     control = np.concatenate(
         [of_part[p.source.number][0].faces[of_part[p.source.number][1]] for p in refined]
     )
-    counts = [
-        np.full(len(p.faces) // 4**levels, 4**levels) if p.counts is None else p.counts
-        for p in refined
-    ]
+    counts = [p.counts for p in refined if p.counts is not None]
     ranks = np.repeat(control, np.concatenate(counts))
     order = slice(None) if len(refined) == 1 else np.argsort(ranks, kind="stable")
     ranks = ranks[order]

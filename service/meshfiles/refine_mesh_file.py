@@ -133,7 +133,7 @@ def _refine_triangles(
         parents = replace(parents, columns=rows[parents.columns], shape=shape)
     kept = [part.faces[keep] for part, keep in zip(parts, made.kept, strict=True)]
     return Refined(
-        mesh=joined(mesh, parts, made.kept, made.refined, options.levels, parents),
+        mesh=joined(mesh, parts, made.kept, made.refined, parents),
         corners=mesh.faces[np.concatenate(kept)].reshape(-1),
         primitives=len(made.refined),
         degenerate=made.degenerate,

@@ -46,7 +46,7 @@ class RefinedPrimitive:
     """A refined primitive, in the types in which it is written.
 
     `vertex` is the vertex of the refined mesh at each row; None where it was cut from a union.
-    `counts` is how many of the faces each face before became; None: as many of each. `outline` are
+    `counts` is how many of the faces each face before became; None: not known. `outline` are
     the pairs of rows between which lines are drawn; None: the primitive draws none.
     """
 

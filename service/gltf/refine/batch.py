@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import chain, compress
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,8 @@ from ...changes import Change
 from ...options import Options
 from ...stages import Stages
 from ..read.primitives import TrianglePrimitive
-from .attributes import RefinedPrimitive, refined_primitives
+from ..read.schema import Accessor
+from .attributes import Columns, RefinedPrimitive, refined_primitives
 from .changes import (
     changes_of_primitive,
     changes_of_vertices,
@@ -130,16 +131,23 @@ def outcome_of(
 def kind_of(primitives: Sequence[TrianglePrimitive]) -> Hashable | None:
     """Return what meshes that may be joined have in common; None for a mesh that may not.
 
-    Poses and the edges of a union are not followed.
+    The edges of a union are not followed. Its vertices have equal room for joints, of one type:
+    other types may become wider by the joints of another mesh.
     """
-    if any(p.targets or skin_sets(p) or p.outline is not None for p in primitives):
+    joints = [[p.attributes[f"JOINTS_{n}"].dtype for n in skin_sets(p)] for p in primitives]
+    one_room = len(set(map(len, joints))) == 1 and len({*chain(*joints)}) <= 1
+    if not one_room or any(p.outline is not None for p in primitives):
         return None
     return tuple(
-        tuple(
-            (name, values.dtype.str, values.shape[1], primitive.accessors[name].normalized)
-            for name, values in primitive.attributes.items()
-        )
-        for primitive in primitives
+        tuple(map(_signature, (p.attributes, *p.targets), (p.accessors, *p.target_accessors)))
+        for p in primitives
+    )
+
+
+def _signature(columns: Columns, accessors: dict[str, Accessor]) -> Hashable:
+    return tuple(
+        (name, values.dtype.str, values.shape[1], accessors[name].normalized)
+        for name, values in columns.items()
     )
 
 
@@ -173,7 +181,7 @@ def refine_batch(
             control, parts = _smoothed(control, parts, creases, options)
     with stages.stage("refine", shares.refine, shares.attributes):
         try:
-            made = refined_union(control, parts, creases, scheme, options)
+            made = refined_union(control, parts, creases, scheme, options, stages)
         except MeshError:
             # The error does not say which mesh it is; that of a mesh alone does.
             return [None] * len(meshes)
@@ -231,12 +239,15 @@ def _joined_primitive(place: int, primitives: Sequence[TrianglePrimitive]) -> Tr
         number=place,
         rows=np.arange(sum(counts)),
         corners=disjoint_faces(zip(faces, counts, strict=True)),
-        attributes={
-            name: np.concatenate([primitive.attributes[name] for primitive in primitives])
-            for name in first.attributes
-        },
+        attributes=_concatenated([primitive.attributes for primitive in primitives]),
         accessors=first.accessors,
+        targets=tuple(map(_concatenated, zip(*(p.targets for p in primitives), strict=True))),
+        target_accessors=first.target_accessors,
     )
+
+
+def _concatenated(columns: Sequence[Columns]) -> Columns:
+    return {name: np.concatenate([each[name] for each in columns]) for name in columns[0]}
 
 
 def _divided(
@@ -280,6 +291,7 @@ def _divided(
             options.levels,
             near[part],
             misses[part],
+            made.skin_and_morph.losses[part],
             copies=copies[part],
             report=made.reports[part],
             bends=bends[part],
@@ -300,19 +312,19 @@ def _divided_primitive(
     place = np.empty_like(order)
     place[order] = np.arange(len(order)) - starts[part_of[order]]
     faces = place[refined.faces]
-    attributes = {name: values[order] for name, values in refined.attributes.items()}
-    ends = np.cumsum([0, *counts])
-    return [
-        RefinedPrimitive(
-            source=source,
-            faces=faces[ends[part] : ends[part + 1]],
-            attributes={
-                name: values[starts[part] : starts[part + 1]] for name, values in attributes.items()
-            },
-            targets=[],
-        )
-        for part, source in enumerate(sources)
+    joined = [
+        {name: v[order] for name, v in each.items()}
+        for each in (refined.attributes, *refined.targets)
     ]
+    ends = np.cumsum([0, *counts])
+    made: list[RefinedPrimitive] = []
+    for part, source in enumerate(sources):
+        own = slice(starts[part], starts[part + 1])
+        attributes, *targets = ({name: v[own] for name, v in each.items()} for each in joined)
+        made.append(
+            RefinedPrimitive(source, faces[ends[part] : ends[part + 1]], attributes, targets)
+        )
+    return made
 
 
 def _shares(

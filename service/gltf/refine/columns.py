@@ -22,6 +22,8 @@ from .split import Split
 
 # Joints that are refined at a time: memory does not grow with the skeleton.
 COLUMNS = 3
+# A loss of weight below this is rounding.
+NOTHING = 1e-9
 
 
 class Linear(Protocol):
@@ -44,24 +46,28 @@ def refined_skin_and_morph(
     if not control.skin_and_morph.any:
         return control.skin_and_morph
     before = control.skin_and_morph.take(control.vertex_rows())
-    return _refined(before, linear, _common_slots(control, split, linear.count), stages)
+    return follow(before, linear, stages, _common_slots(control, split, linear.count))
 
 
-def _refined(
+def follow(
     before: SkinAndMorph,
     linear: Linear,
-    slots: Int[np.ndarray, " V"] | None,
     stages: Stages,
+    slots: Int[np.ndarray, " V"] | None = None,
 ) -> SkinAndMorph:
-    """Refine skin and morph; deltas in float32, in which they are written."""
-    binding, lost = None, None
+    """Refine skin and morph of vertices; deltas in float32, in which they are written.
+
+    `slots` are those of each refined vertex; None: all have the binding's.
+    """
+    binding, lost = None, np.zeros(0)
     if before.binding is not None:
         binding, lost = _refined_binding(before.binding, linear, slots, stages)
+        lost = lost[lost > NOTHING]
     deltas: list[Float[np.ndarray, "V 3"]] = []
     for delta in before.deltas:
         stages.reach(1.0)
         deltas.append(linear(delta.astype(np.float64)).astype(np.float32))
-    return SkinAndMorph(binding, tuple(deltas), lost)
+    return SkinAndMorph(binding, tuple(deltas), [(len(lost), float(lost.max(initial=0.0)))])
 
 
 def _refined_binding(

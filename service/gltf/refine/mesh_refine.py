@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -28,11 +28,11 @@ from ...errors import UnrefinableError
 from ...meshes.creases import chosen_creases
 from ...options import Options
 from ...stages import Stages
-from .columns import refined_skin_and_morph
+from .columns import follow, refined_skin_and_morph
 from .control_mesh import ControlMesh, Parts
 from .new_normals import hard_edges, marked_edges
 from .skin import SkinAndMorph
-from .split import Split, whole_levels
+from .split import Split, whole_levels, without_sides
 
 RATIO, GATE = "_PNS_RATIO", "_PNS_GATE"
 
@@ -50,8 +50,8 @@ class RefinedMesh:
         split: what the kept faces were split into.
         parents: the vertices of the control mesh that each is made of; None: not asked for.
         topology: of the control mesh; None for a union.
-        levels: the topologies that were refined, control mesh first; none for a union, and where
-            faces have several levels.
+        levels: the edges that were refined, as of `without_sides`, control mesh first; none for a
+            union, and where faces have several levels.
         still: (V,) vertices of the control mesh that no chosen face has; None: all are chosen.
     """
 
@@ -159,8 +159,10 @@ def refined_mesh(
     except MeshError as error:
         raise UnrefinableError(str(error), pointer=pointer) from error
     levels, base = made.topologies, made.scheme.base
-    split = whole_levels(control.faces, made.mesh.corners, options.levels, base, levels)
-    linear = ColumnRefinement(levels, base, options.limit, Blocks(available_threads()))
+    known = without_sides(levels, base)
+    split = whole_levels(control.faces, made.mesh.corners, options.levels, base, known)
+    blocks = Blocks(available_threads())
+    linear = ColumnRefinement(levels, base, options.limit, blocks, made.surface)
     return RefinedMesh(
         made.mesh,
         [made.report],
@@ -170,7 +172,7 @@ def refined_mesh(
         split,
         made.parents if traced else None,
         levels[0],
-        levels,
+        known,
     )
 
 
@@ -180,8 +182,11 @@ def refined_union(
     creases: Creases,
     scheme: Scheme,
     options: Options,
+    stages: Stages,
 ) -> RefinedMesh:
-    """Refine the parts of a union, which have no skin or morph, each to the bits of it alone.
+    """Refine the parts of a union, each to the bits that it has alone.
+
+    All primitives of a part have equal room for joints.
 
     Raises:
         MeshError: a part cannot be refined, or its positions leave the range of float32.
@@ -202,11 +207,24 @@ def refined_union(
     return RefinedMesh(
         Mesh.of_refined(np.concatenate([each.mesh.vertices for each in made]), faces),
         [each.report for each in made],
-        control.skin_and_morph,
+        SkinAndMorph.joined([*_followed(control, made, options, stages)]),
         {name: np.concatenate([each[name] for each in scalars]) for name in scalars[0]},
         np.concatenate(normals) if normals else None,
         whole_levels(control.faces, faces.reshape(-1), options.levels, LOOP, ()),
     )
+
+
+def _followed(
+    control: ControlMesh, made: Sequence[Refinement], options: Options, stages: Stages
+) -> Iterator[SkinAndMorph]:
+    """Yield skin and morph of each part."""
+    rows, first, blocks = control.vertex_rows(), 0, Blocks(available_threads())
+    for each in made:
+        levels = each.topologies
+        own = rows[first : first + levels[0].vertex_count]
+        linear = ColumnRefinement(levels, LOOP, options.limit, blocks, each.surface)
+        yield follow(control.skin_and_morph.take(own), linear, stages)
+        first += len(own)
 
 
 def _jobs(

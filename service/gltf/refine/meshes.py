@@ -263,7 +263,7 @@ def refine_alone(
             refined = [with_outline(each, outlines) for each in refined]
     misses, lost = 0, NOTHING_LOST
     if made is not None and made.topology is not None:
-        length, lost = made.reports[0]["reference_length"], made.skin_and_morph.losses
+        length, lost = made.reports[0]["reference_length"], made.skin_and_morph.losses[0]
         (misses,) = near_misses(control.surface.vertices, made.topology, [length])
     return outcome_of(
         plan.mesh,

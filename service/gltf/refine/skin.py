@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
@@ -21,8 +22,6 @@ POSITION = "POSITION"
 SLOTS = 4
 # Sums of weights that are multiples of 2⁻²⁴ are exact in float32, in any order.
 FLOAT_UNITS = 2**24
-# A loss of weight below this is rounding.
-NOTHING = 1e-9
 
 _SET = re.compile(r"WEIGHTS_([0-9]+)")
 _NO_JOINT = np.iinfo(np.int64).max
@@ -52,23 +51,18 @@ class SkinAndMorph:
     Attributes:
         binding: None for a mesh without skin.
         deltas: for each morph target, the displacement of each vertex.
-        lost: share of the weight that each vertex lost for lack of slots; None: nothing.
+        losses: for each part, the number of vertices that lost weight for lack of slots, and the
+            most that one of them lost.
     """
 
     binding: Binding | None
     deltas: tuple[Float[np.ndarray, "N 3"], ...]
-    lost: Float[np.ndarray, " N"] | None = None
+    losses: Sequence[tuple[int, float]] = ((0, 0.0),)
 
     @property
     def any(self) -> bool:
         """True where there is a skin or a morph target."""
         return self.binding is not None or bool(self.deltas)
-
-    @property
-    def losses(self) -> tuple[int, float]:
-        """Number of vertices that lost weight, and the most that one of them lost."""
-        shares = np.zeros(0) if self.lost is None else self.lost[self.lost > NOTHING]
-        return len(shares), float(shares.max(initial=0.0))
 
     @property
     def labels(self) -> Int[np.ndarray, " N"] | None:
@@ -83,6 +77,15 @@ class SkinAndMorph:
         """Return skin and morph of some of the vertices."""
         binding = None if self.binding is None else self.binding.take(rows)
         return SkinAndMorph(binding, tuple(np.take(d, rows, axis=0) for d in self.deltas))
+
+    @classmethod
+    def joined(cls, parts: Sequence[SkinAndMorph]) -> SkinAndMorph:
+        """Return skin and morph of the vertices of all parts, which are bound alike."""
+        pairs = [(p.binding.joints, p.binding.weights) for p in parts if p.binding is not None]
+        binding = Binding(*map(np.concatenate, zip(*pairs, strict=True))) if pairs else None
+        deltas = zip(*(part.deltas for part in parts), strict=True)
+        losses = list(chain.from_iterable(part.losses for part in parts))
+        return cls(binding, tuple(map(np.concatenate, deltas)), losses)
 
 
 def skin_sets(primitive: TrianglePrimitive) -> list[int]:

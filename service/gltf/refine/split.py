@@ -21,7 +21,7 @@ from pns_common.carry.charts import chart_points, refine_charts
 from pns_common.carry.columns import level_topologies
 from pns_common.carry.descendants import copied_corners, corner_weights, cut_quads
 from pns_common.mesh.creases import NO_CREASES, Creases
-from pns_common.mesh.topology import Topology, following
+from pns_common.mesh.topology import NO_WEIGHTS, Topology, following
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import BaseScheme
 
@@ -96,7 +96,7 @@ class WholeLevels:
         levels: how many.
         offsets: (Q + 1,) where the corners of each kept face begin.
         vertices: as of `Split`; of polygons' quads, which are then cut into triangles.
-        known: the topologies of the control mesh that were refined; none if they are not known.
+        known: `without_sides` of the control mesh's, if `vertices` are those of its own faces.
         places: (3 M,) the corners that are kept, where some faces are refined alone; None: all.
     """
 
@@ -136,10 +136,14 @@ class WholeLevels:
     def rows(self, corners: Int[np.ndarray, " H"]) -> Rows:
         """Return the rows that rows at the corners of the kept faces become."""
         topologies, blocks = self.known, Blocks(available_threads())
-        if not (topologies and np.array_equal(topologies[0].corners, corners)):
+        if topologies and np.array_equal(topologies[0].corners, corners):
+            at = self.vertices.astype(np.int32)
+        else:
             count = int(corners.max()) + 1
-            topologies = self._topologies(corners, count, NO_CREASES)
-        at = self.base.faces(topologies[-1], blocks).reshape(-1).view(np.int32)
+            whole = self._topologies(corners, count, NO_CREASES)
+            at = self.base.faces(whole[-1], blocks).reshape(-1).view(np.int32)
+            topologies = without_sides(whole, self.base)
+            del whole
         place, carrier = _places(at), Carrier(topologies, self.base, blocks=blocks)
         return Rows(corners, at, place, _Levels(carrier, corners, at, place))
 
@@ -257,6 +261,17 @@ class SeveralLevels:
     wholes = faces
 
 
+def without_sides(topologies: Sequence[Topology], base: BaseScheme) -> list[Topology]:
+    """Return topologies of what linear blends read: ends of edges, and corners of polygons.
+
+    The first keeps all of its corners.
+    """
+    none = topologies[0].edges[:0, 0]
+    sides = dict.fromkeys(("face_of_corner", "corner_edges", "half_edges", "edge_class"), none)
+    first, *others = (replace(mesh, **sides, soft=NO_WEIGHTS) for mesh in topologies)
+    return [first, *(m if base.polygons else replace(m, corners=none) for m in others)]
+
+
 def whole_levels(
     kept: KeptFaces,
     refined: Int[np.ndarray, " Y"],
@@ -270,6 +285,8 @@ def whole_levels(
     own order of corners.
     """
     each, source = 4**levels, kept.source
+    if np.array_equal(source, np.arange(len(kept.surface.corners))):
+        return WholeLevels(base, levels, kept.offsets, refined, known)
     if base.polygons:
         vertices = refined.reshape(-1, each)[source]
         turned = np.repeat(kept.turned, np.diff(kept.offsets))
@@ -278,14 +295,13 @@ def whole_levels(
     else:
         vertices = refined.reshape(-1, 3 * each)
         source = source.reshape(-1, 3)
-        if not np.array_equal(source[:, 0], np.arange(0, 3 * len(vertices), 3)):
-            vertices = vertices[source[:, 0] // 3]
+        vertices = vertices[source[:, 0] // 3]
         orders = source % 3
         moved = np.flatnonzero((orders != [0, 1, 2]).any(axis=1))
         for order in np.unique(orders[moved], axis=0):
             rows = moved[(orders[moved] == order).all(axis=1)]
             vertices[rows] = vertices[rows][:, copied_corners(tuple(order.tolist()), levels)]
-    return WholeLevels(base, levels, kept.offsets, vertices.reshape(-1), known)
+    return WholeLevels(base, levels, kept.offsets, vertices.reshape(-1))
 
 
 def several_levels(

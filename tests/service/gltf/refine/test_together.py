@@ -34,7 +34,7 @@ OPTIONS = [
     {"weld_tolerance": 0.001},
 ]
 MORE_OPTIONS = [
-    {"limit": True, "normals": "limit", "levels": 2},
+    {"limit": False, "normals": "smooth", "levels": 2},
     {"normals": "smooth", "crease": "angle:40", "levels": 2},
     {"weld_tolerance": 0.01, "reference_length": 0.5, "normals": "smooth"},
     {"limit": True, "crease": "normals", "uv": "smooth", "levels": 3},
@@ -144,10 +144,33 @@ def test_skins_targets_and_pieces_together_are_as_alone(
     assert made.glb == alone.glb
 
 
+@pytest.mark.parametrize("sets", [[[1, 2]], [[1], [1, 1]]], ids=str)
+def test_joints_of_several_types_or_sets_are_as_alone(
+    sets: list[list[int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def piece(first: int, widths: list[int], faces: np.ndarray) -> dict[str, object]:
+        made = {**octahedron(), "indices": faces}
+        for number, width in enumerate(widths):
+            joints = first + np.arange(24).reshape(6, 4) + 24 * number
+            joints = joints if width == 2 else joints % 200
+            made[f"JOINTS_{number}"] = joints.astype(f"<u{width}")
+            # Pieces that are bound alike are one surface.
+            share = 0.25 if number == 0 or len(sets) == 1 else 0.0
+            made[f"WEIGHTS_{number}"] = np.full((6, 4), share, dtype=np.float32)
+        return made
+
+    halves = np.array_split(np.asarray(octahedron()["indices"]).reshape(-1, 3), len(sets))
+    shapes = [[piece(first, *own) for own in zip(sets, halves, strict=True)] for first in (0, 300)]
+    made = refine(files.glb(*shapes))
+    monkeypatch.setattr(meshes, "MOST_FACES", -1)
+    alone = refine(files.glb(*shapes))
+    assert (made.glb, made.report) == (alone.glb, alone.report)
+
+
 @pytest.mark.parametrize(
     "asked", [{}, {"limit": True}, {"normals": "smooth"}, {"weld_tolerance": 0.001}], ids=str
 )
-def test_no_small_mesh_without_poses_goes_alone(
+def test_no_small_mesh_goes_alone(
     asked: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
@@ -155,7 +178,7 @@ def test_no_small_mesh_without_poses_goes_alone(
 
     monkeypatch.setattr(meshes, "refine_alone", refuse)
     rng = np.random.default_rng(0)
-    shapes = [random_mesh(rng, 4 * (number % 4)) for number in range(64)]
+    shapes = [random_mesh(rng, number % 16) for number in range(64)]
     # Those that have no face to keep are not refined at all.
     whole = [shape for shape in shapes if sum(len(piece["indices"]) for piece in shape) > 4]
     assert len(whole) > 48
