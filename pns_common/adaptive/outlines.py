@@ -74,7 +74,7 @@ def triangles_in(
     # Where one side alone has new vertices, a fan from the corner opposite.
     last, first = (np.where(new, at, none).astype(np.int64) for none in (-1, TRIANGLE))
     side, tied = last.max(axis=1), np.zeros(len(at), dtype=bool)
-    begin = (at == (side + 2)[:, None] % TRIANGLE).argmax(axis=1)
+    begin = (at == np.where(side < 0, 0, (side + 2) % TRIANGLE)[:, None]).argmax(axis=1)
     made = (begin[:, None, None] + [[0, k + 1, k + 2] for k in range(size - 2)]) % size
     rest = np.flatnonzero(side > first.min(axis=1))
     if len(rest):
