@@ -106,19 +106,22 @@ def distances(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
 def cut_distances(
     slabs: Float[np.ndarray, "N 3"],
     triangles: Float[np.ndarray, "N 3 3"],
-    middles: Float[np.ndarray, "N 3"],
+    points: Float[np.ndarray, "M 3"],
+    offsets: Integer[np.ndarray, " N1"],
 ) -> Float[np.ndarray, " N"]:
-    """Return how far patches can be from their triangles if these are cut at points of them.
+    """Return how far patches can be from what fills outlines of their triangles.
 
-    The cut raises a triangle by 0 to the point's height. Where that is not known (NaN) it lies in
-    the slab, so both are apart by no more than the slab is wide.
+    That lies at heights between those of the outline's points, corners among them. Where one is not
+    known (NaN) it lies in the slab, so both are apart by no more than the slab is wide.
     """
     a, b, c = (triangles[:, k] for k in range(3))
-    height = dot(middles - a, unit(cross(b - a, c - a)))
+    counts, normals = np.diff(offsets), unit(cross(b - a, c - a))
+    heights = dot(points - np.repeat(a, counts, axis=0), np.repeat(normals, counts, axis=0))
+    least, most = (by.reduceat(heights, offsets[:-1]) for by in (np.minimum, np.maximum))
     low, high = slabs[:, LOW], slabs[:, HIGH]
-    known = np.maximum(high - np.minimum(height, 0), np.maximum(height, 0) - low)
-    sizes = np.where(np.isnan(height), high - low, known)
-    # What lies beyond a side is so far from where the side was, which the cut may move.
+    known = np.maximum(high - np.minimum(least, 0), np.maximum(most, 0) - low)
+    sizes = np.where(np.isnan(least), high - low, known)
+    # What lies beyond a side is so far from where the side was, which new corners may move.
     side = slabs[:, SIDE]
     return np.maximum(sizes, np.where(side > 0, distances(slabs) + side, 0.0))
 

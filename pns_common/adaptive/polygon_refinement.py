@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -31,14 +31,8 @@ class PolygonRefinement(AdaptiveRefinement):
     """A refinement of polygons with faces of several levels.
 
     ``codes`` number control faces at level 0, and from level 1 on quads: that of the control
-    mesh's corner h is h, and those of quad c are 4 c … 4 c + 3. There are no ``halves``.
-
-    Attributes:
-        at: (H,) where each corner is on the outline of the face that its face is, or is cut from:
-            k + t on the side from corner k on.
+    mesh's corner h is h, and those of quad c are 4 c … 4 c + 3.
     """
-
-    at: Float[np.ndarray, " H"] = field(repr=False)
 
     @cached_property
     def face_parents(self) -> Integer[np.ndarray, " F"]:
@@ -165,7 +159,6 @@ def refine_polygons(
         scheme=scheme,
         surface=None,
         codes=codes[order],
-        halves=np.zeros(len(order), dtype=np.int8),
         face_levels=depths,
         distances=distances[order],
         angles=np.zeros(len(order)),

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.adaptive.certificate import FOLD, HIGH, LOW, SIDE
+from pns_common.adaptive.outlines import Outlines, Written
 from pns_common.adaptive.parts import CHILDREN, Part
 from pns_common.adaptive.quad_certificate import (
     DEEPER,
@@ -28,7 +29,7 @@ from pns_common.adaptive.quad_certificate import (
     planes,
     ragged,
 )
-from pns_common.adaptive.tree import Flags, Layer, Measures, Start, Tree
+from pns_common.adaptive.tree import Flags, Measures, Start, Tree, edges_of
 from pns_common.kernels import connectivity
 from pns_common.mesh.creases import edge_cosines
 from pns_common.mesh.rows import dot, marked
@@ -39,59 +40,17 @@ EQUAL = 1 - 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Outlines:
-    """Faces with the new vertices on their sides.
-
-    Attributes:
-        names: vertices, face after face.
-        at: where each is: k + t on the side from corner k on.
-        offsets: where those of each face begin.
-    """
-
-    names: Integer[np.ndarray, " M"]
-    at: Float[np.ndarray, " M"]
-    offsets: Integer[np.ndarray, " N1"]
-
-
-@dataclass(frozen=True, eq=False)
 class PolygonTree(Tree):
     """A tree whose faces are polygons, and quads from the first level on."""
 
-    def outlines(self, split: Flags, depth: int, rows: Integer[np.ndarray, " N"]) -> Outlines:
-        """Return faces of a level, which are not split, with the new vertices on their sides."""
-        layer = self.layers[depth]
-        mesh = layer.part.topology
-        corners, offsets = ragged(mesh.offsets, rows)
-        after = following(mesh.offsets)[corners]
-        first = np.repeat(offsets[:-1], np.diff(offsets))
-        own, at = [np.arange(len(corners))], [np.arange(len(corners)) - first + 0.0]
-        ends = layer.part.names[mesh.corners[np.stack([corners, after])]]
-        names, edges = [ends[0]], mesh.corner_edges[corners].astype(np.int64)
-        here, place, size = own[0], at[0], 1.0
-        while len(edges):
-            hit = edges_of(layer, split[depth])[edges]
-            edges, here, ends, place = edges[hit], here[hit], ends[:, hit], place[hit]
-            if len(edges) == 0:
-                break
-            middle, size = layer.middles[edges], size / 2
-            own.append(here)
-            at.append(place + size)
-            names.append(middle)
-            depth += 1
-            if depth == len(self.layers):
-                break
-            layer = self.layers[depth]
-            halves = np.stack([ends[0], middle, middle, ends[1]]).reshape(2, 2, -1)
-            ends = halves.transpose(1, 0, 2).reshape(2, -1)
-            here, place = np.tile(here, 2), np.concatenate([place, place + size])
-            edges = _edges_between(layer.part, ends)
-            there = edges >= 0
-            edges, here, ends, place = edges[there], here[there], ends[:, there], place[there]
-        every, places = np.concatenate(own), np.concatenate(at)
-        order = np.lexsort([places, every])
-        counts = np.bincount(every, minlength=len(corners))
-        ended = np.concatenate([[0], np.cumsum(counts)])
-        return Outlines(np.concatenate(names)[order], places[order], ended[offsets])
+    def children_at(
+        self, depth: int, corners: Integer[np.ndarray, "*N"]
+    ) -> Integer[np.ndarray, "*N"]:
+        """Return the codes of faces' children at some corners."""
+        if depth == 0:
+            return corners
+        rows, corner = np.divmod(corners, QUAD)
+        return CHILDREN * self.layers[depth].part.codes[rows] + corner
 
     def distances(
         self, depth: int, rows: Integer[np.ndarray, " N"], given: Outlines
@@ -194,25 +153,10 @@ class PolygonTree(Tree):
         order = np.argsort(own, kind="stable")
         moved, _ = ragged(np.concatenate([[0], np.cumsum(counts)]), order)
         places, own = places[moved], own[order]
-        codes = layer.part.codes[there[own]]
-        return Written(given.names[places], given.at[places], counts[order], distance[own], codes)
-
-
-@dataclass(frozen=True, eq=False)
-class Written:
-    """Written faces of one level.
-
-    Attributes:
-        names, at: vertices of their corners and where these are on the outline of the face.
-        counts: how many corners each has.
-        distances, codes: of the faces that they are or are cut from.
-    """
-
-    names: Integer[np.ndarray, " H"]
-    at: Float[np.ndarray, " H"]
-    counts: Integer[np.ndarray, " F"]
-    distances: Float[np.ndarray, " F"]
-    codes: Integer[np.ndarray, " F"]
+        turns, codes = layer.turns[there[own]], layer.part.codes[there[own]]
+        return Written(
+            given.names[places], given.at[places], counts[order], distance[own], turns, codes
+        )
 
 
 @cache
@@ -346,23 +290,3 @@ def padded(
     counts = np.diff(mesh.offsets)[rows].astype(np.int64)
     each = np.arange(int(counts.max(initial=TRIANGLE)))
     return mesh.offsets[rows][:, None] + np.where(each < counts[:, None], each, 0), counts
-
-
-def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " E"]:
-    """Return which edges are sides of split faces."""
-    mesh = layer.part.topology
-    own = np.repeat(split, np.diff(mesh.offsets))
-    return marked(mesh.corner_edges[own], len(mesh.edges))
-
-
-def _edges_between(part: Part, ends: Integer[np.ndarray, "2 N"]) -> Integer[np.ndarray, " N"]:
-    """Return the edges of a part between named vertices; −1 where there is none."""
-    names = np.sort(part.names[part.topology.edges.astype(np.int64)], axis=1)
-    wanted: Integer[np.ndarray, "2 N"] = np.sort(ends, axis=0)
-    size = 1 + max(int(names.max(initial=0)), int(wanted.max(initial=0)))
-    keys: Integer[np.ndarray, " E"] = names[:, 0] * size + names[:, 1]
-    asked: Integer[np.ndarray, " N"] = wanted[0] * size + wanted[1]
-    order = np.argsort(keys, kind="stable")
-    there: Integer[np.ndarray, " N"] = np.searchsorted(keys, asked, sorter=order)
-    at = order[np.minimum(there, len(keys) - 1)]
-    return np.where(np.equal(keys[at], asked), at, -1)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.adaptive.certificate import distances
 from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part, Refined, Settled
 from pns_common.adaptive.tree import (
     DIGITS,
@@ -20,8 +19,6 @@ from pns_common.adaptive.tree import (
     Goal,
     Start,
     Tree,
-    edges_of,
-    sides_of,
 )
 from pns_common.adaptive.turning import degrees
 from pns_common.errors import MeshError, ParameterError
@@ -47,19 +44,6 @@ ENOUGH = 0.98
 # Shares of the work, roughly: until the learned level is there, until trees have all their faces
 # but those that closing adds, and until those to split are chosen.
 LEARNED, GROWN, CHOSEN = 0.15, 0.65, 0.75
-# The weights of a face's corners at its own, and at those of its halves: of a cut at side k these
-# are 2 k + 1 and 2 k + 2.
-HALVES = 0.5 * np.array(
-    [
-        [[2, 0, 0], [0, 2, 0], [0, 0, 2]],
-        [[2, 0, 0], [1, 1, 0], [0, 0, 2]],
-        [[1, 1, 0], [0, 2, 0], [0, 0, 2]],
-        [[0, 2, 0], [0, 1, 1], [2, 0, 0]],
-        [[0, 1, 1], [0, 0, 2], [2, 0, 0]],
-        [[0, 0, 2], [1, 0, 1], [0, 2, 0]],
-        [[1, 0, 1], [2, 0, 0], [0, 2, 0]],
-    ]
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +138,9 @@ class AdaptiveRefinement(Refinement):
     """A refinement with faces of several levels.
 
     Attributes:
-        codes: (F,) number of each face, or of that of which it is a half, in its level.
-        halves: (F,) which half, as of ``HALVES``; 0: none.
+        codes: (F,) number of each face, or of that of which it is a piece, in its level.
+        at: (H,) where each corner is on the outline of that face: k + t on the side from corner k
+            on.
         face_levels: (F,) how often each face's parent was split.
         distances: (F,) no point of the part of the limit surface that a face stands for is farther
             from its plane, in the mesh's units; at sharp edges none from the edge.
@@ -167,7 +152,7 @@ class AdaptiveRefinement(Refinement):
     """
 
     codes: Integer[np.ndarray, " F"] = field(repr=False)
-    halves: Integer[np.ndarray, " F"] = field(repr=False)
+    at: Float[np.ndarray, " H"] = field(repr=False)
     face_levels: Integer[np.ndarray, " F"] = field(repr=False)
     distances: Float[np.ndarray, " F"] = field(repr=False)
     angles: Float[np.ndarray, " F"] = field(repr=False)
@@ -186,7 +171,9 @@ class AdaptiveRefinement(Refinement):
 
         They are whole multiples of 2^-levels, and sum to 1.
         """
-        made, codes = HALVES[self.halves], self.codes
+        codes, side, along = self.codes, self.at.astype(np.int64), (self.at % 1)[:, None]
+        own, other = np.eye(3)[side], np.eye(3)[(side + 1) % 3]
+        made = ((1 - along) * own + along * other).reshape(-1, 3, 3)
         for level in range(int(self.face_levels.max(initial=0))):
             rows = np.flatnonzero(self.face_levels > level)
             made[rows] = made[rows] @ CHILD_WEIGHTS[(codes[rows] >> (2 * level)) % CHILDREN]
@@ -438,12 +425,16 @@ def _written(
     tree: Tree, level: Level, first: Step | None, scheme: Scheme, levels: Levels, goal: Goal
 ) -> AdaptiveRefinement:
     """Return the refinement of a tree whose faces can be cut to meet."""
-    made = [_faces_of(tree, depth) for depth in range(len(tree.layers))]
+    made = [tree.written(depth, tree.split) for depth in range(len(tree.layers))]
     keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    names, halves, distance, turned, codes = (
+    distance, turned, codes = (
         np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("names", "halves", "distances", "turns", "codes")
+        for name in ("distances", "turns", "codes")
+    )
+    names, at = (
+        np.concatenate([getattr(own, name) for own in made]).reshape(-1, 3)[order]
+        for name in ("names", "at")
     )
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
@@ -466,7 +457,7 @@ def _written(
         scheme=scheme,
         surface=None,
         codes=codes,
-        halves=halves,
+        at=at.reshape(-1),
         face_levels=depths,
         distances=distance,
         angles=degrees(turned),
@@ -474,39 +465,6 @@ def _written(
         trail=Trail(steps, settled, rows, levels),
         control=level,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Faces:
-    """Faces of one level: names of corners, halves, distances, turns, codes."""
-
-    names: Integer[np.ndarray, "F 3"]
-    halves: Integer[np.ndarray, " F"]
-    distances: Float[np.ndarray, " F"]
-    turns: Float[np.ndarray, " F"]
-    codes: Integer[np.ndarray, " F"]
-
-
-def _faces_of(tree: Tree, depth: int) -> _Faces:
-    """Return the faces of a level that are not split; those beside split ones are cut in two."""
-    layer = tree.layers[depth]
-    mesh, part, hit = layer.part.topology, layer.part, edges_of(layer, layer.split)
-    rows = np.flatnonzero(part.exists & ~layer.split)
-    cut = np.flatnonzero(sides_of(mesh, hit, rows))
-    codes, distance, names = part.codes[rows], distances(layer.slabs[rows]), mesh.faces[rows]
-    names, edges = part.names[names], mesh.face_edges[rows[cut]]
-    distance[cut] = tree.cut_distances(depth, rows[cut], hit)
-    side, own = hit[edges].argmax(axis=1), np.arange(len(cut))
-    middle = layer.middles[edges[own, side]]
-    # From a corner a, before the side that is cut at m: (a, m, c) and (m, b, c).
-    a, b, c = (names[cut, (side + k) % 3] for k in range(3))
-    counts, halves = np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int8)
-    counts[cut] = 2
-    at, firsts = np.repeat(np.arange(len(rows)), counts), (np.cumsum(counts) - counts)[cut]
-    names, halves = names[at], halves[at]
-    names[firsts], names[firsts + 1] = np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)
-    halves[firsts], halves[firsts + 1] = 2 * side + 1, 2 * side + 2
-    return _Faces(names, halves, distance[at], layer.turns[rows[at]], codes[at])
 
 
 # --- arguments ------------------------------------------------------------------------------------

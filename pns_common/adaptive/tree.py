@@ -1,9 +1,8 @@
-"""A tree of faces: those that are split, and cuts where neighbours of two levels meet.
+"""A tree of faces: those that are split, and those that take their neighbours' vertices.
 
 A face is split where its error is too large. Then, so that no vertex lies inside of another face's
-side, neighbours differ by one level at most: a face beside one that is split is cut in two, from
-the new vertex to the corner opposite; with two such sides it is split too. So there is nothing to
-choose, and the result does not depend on numbering.
+side, a face beside finer ones takes all vertices on its sides as corners, and is filled with
+triangles between these. It is split if that could be too far from the limit surface.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from pns_common.adaptive.certificate import cut_distances, distances, folded, slabs
+from pns_common.adaptive.outlines import Outlines, Written, triangles_in
 from pns_common.adaptive.parts import (
     CHILDREN,
     NOT_THERE,
@@ -25,10 +25,11 @@ from pns_common.adaptive.parts import (
     Settled,
     rows_of_faces,
 )
+from pns_common.adaptive.quad_certificate import ragged
 from pns_common.adaptive.turning import chord, turns
 from pns_common.kernels import connectivity as kernels
-from pns_common.mesh.rows import marked
-from pns_common.mesh.topology import Topology
+from pns_common.mesh.rows import cross, marked, unit
+from pns_common.mesh.topology import TRIANGLE, Topology
 
 # Faces that are measured between two reports of progress.
 TOGETHER = 2**16
@@ -116,10 +117,13 @@ class Tree:
     Attributes:
         layers: from the control mesh on.
         places: (N, 3) where named vertices are on the limit surface; NaN where none exists.
+        middles_only: faces take new vertices in the middles of their sides alone: normals at others
+            are not measured.
     """
 
     layers: Sequence[Layer]
     places: Float[np.ndarray, "N 3"]
+    middles_only: bool = False
 
     @property
     def split(self) -> Flags:
@@ -140,37 +144,99 @@ class Tree:
         ]
 
     def closed(self, split: Flags, widest: float | None = None) -> Flags:
-        """Return the faces to split, so that the others can be cut to meet them.
+        """Return the faces to split, so that the others can take all vertices on their sides.
 
         Args:
             split: faces that are split in any case, level by level; with a face its ancestors.
-            widest: faces are cut in two only if both parts are no farther from the limit surface;
+            widest: faces get new vertices only if they are no farther from the limit surface;
                 None: any.
         """
-        made = [own.copy() for own in split]
-        for depth in reversed(range(len(made))):
-            layer, own = self.layers[depth], made[depth]
-            mesh, hit, every = layer.part.topology, edges_of(layer, own), np.arange(len(own))
-            rows, edges = every, mesh.face_edges
-            while True:
-                sides = sides_of(mesh, hit, rows)
-                more = sides > 1
+        made, more, ties = [own.copy() for own in split], True, False
+        while more or not ties:
+            more, ties = False, not more
+            for depth in reversed(range(len(made))):
+                if widest is None and not self.middles_only:
+                    continue
+                rows = self.beside(depth, made)
+                given = self.outlines(made, depth, rows)
+                far = np.zeros(len(rows), dtype=bool)
+                if self.middles_only:
+                    other = given.at * 2 % 1 > 0
+                    far = np.bincount(given.owner[other], minlength=len(rows)) > 0
                 if widest is not None:
-                    cut = np.flatnonzero((sides == 1) & ~own[rows] & layer.part.exists[rows])
-                    more[cut] = self.cut_distances(depth, rows[cut], hit) > widest
-                new = rows[more & ~own[rows]]
-                if len(new) == 0:
-                    break
-                own[new] = True
-                fresh = marked(edges[new], len(hit)) & ~hit
-                hit |= fresh
-                rows = np.flatnonzero(sides_of(mesh, fresh, every))
-            if depth:
-                # Such a face exists, or is split or cut, only where its parent is split.
-                asked = layer.part.codes[own | (sides_of(mesh, hit, every) > 0)] // CHILDREN
-                above = self.layers[depth - 1].part.codes
-                made[depth - 1][np.searchsorted(above, asked)] = True
+                    far |= self.distances(depth, rows, given) > widest
+                    # At last, so that the result does not depend on where the mesh is.
+                    far |= self.filled(depth, rows, given)[2] if ties else False
+                made[depth][rows[far]] = True
+                more |= bool(far.any())
         return made
+
+    def beside(self, depth: int, split: Flags) -> Integer[np.ndarray, " N"]:
+        """Return the faces of a level that are not split and have new vertices on their sides."""
+        layer, own = self.layers[depth], split[depth]
+        mesh = layer.part.topology
+        rows = np.flatnonzero(~own)
+        rows = rows[sides_of(mesh, edges_of(layer, own), rows) > 0]
+        return (
+            rows[split[depth - 1][self.parents(depth, layer.part.codes[rows])]] if depth else rows
+        )
+
+    def outlines(self, split: Flags, depth: int, rows: Integer[np.ndarray, " N"]) -> Outlines:
+        """Return faces of a level, which are not split, with the new vertices on their sides."""
+        layer = self.layers[depth]
+        mesh = layer.part.topology
+        corners, offsets = ragged(mesh.offsets, rows)
+        first = np.repeat(offsets[:-1], np.diff(offsets))
+        here, place, size = np.arange(len(corners)), np.arange(len(corners)) - first + 0.0, 1.0
+        own, at, names = [here], [place], [layer.part.names[mesh.corners[corners]]]
+        while True:
+            edges = layer.part.topology.corner_edges[corners].astype(np.int64)
+            hit = edges_of(layer, split[depth])[edges]
+            corners, here, place, size = corners[hit], here[hit], place[hit], size / 2
+            if len(corners) == 0:
+                break
+            own.append(here)
+            at.append(place + size)
+            names.append(layer.middles[edges[hit]])
+            if depth + 1 == len(self.layers):
+                break
+            # Each half is a side of the child at its end of the side.
+            mesh, finer = layer.part.topology, self.layers[depth + 1].part
+            codes = self.children_at(depth, np.stack([corners, after(mesh, corners)])).reshape(-1)
+            found = np.minimum(np.searchsorted(finer.codes, codes), len(finer.codes) - 1)
+            there, degree = (
+                finer.codes[found] == codes,
+                len(finer.topology.corners) // len(finer.codes),
+            )
+            corners = degree * found + np.repeat([0, degree - 1], len(corners))
+            here, place = np.tile(here, 2), np.concatenate([place, place + size])
+            corners, here, place = corners[there], here[there], place[there]
+            depth += 1
+            layer = self.layers[depth]
+        every, places = np.concatenate(own), np.concatenate(at)
+        order = np.lexsort([places, every])
+        ended = np.concatenate([[0], np.cumsum(np.bincount(every, minlength=int(offsets[-1])))])
+        return Outlines(np.concatenate(names)[order], places[order], ended[offsets])
+
+    def children_at(
+        self, depth: int, corners: Integer[np.ndarray, "*N"]
+    ) -> Integer[np.ndarray, "*N"]:
+        """Return the codes of faces' children at some corners."""
+        rows, corner = np.divmod(corners, TRIANGLE)
+        return CHILDREN * self.layers[depth].part.codes[rows] + corner
+
+    def distances(
+        self, depth: int, rows: Integer[np.ndarray, " N"], given: Outlines
+    ) -> Float[np.ndarray, " N"]:
+        """Return how far patches can be from faces of some outlines, however these are cut."""
+        slabs, triangles = self.layers[depth].slabs[rows], self.triangles(depth, rows)
+        there = np.where((given.names == NOT_THERE)[:, None], np.nan, self.places[given.names])
+        return cut_distances(slabs, triangles, there, given.offsets)
+
+    def triangles(self, depth: int, rows: Integer[np.ndarray, " N"]) -> Float[np.ndarray, "N 3 3"]:
+        """Return the corners of faces."""
+        part = self.layers[depth].part
+        return self.places[part.names[part.topology.faces[rows]]]
 
     def parents(self, depth: int, codes: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
         """Return the rows of the parents of faces of a level in the level before."""
@@ -178,42 +244,75 @@ class Tree:
 
     def middles_of(self, depth: int, rows: Integer[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
         """Return the middles of faces."""
-        part = self.layers[depth].part
-        return self.places[part.names[part.topology.faces[rows]]].mean(axis=1)
-
-    def cut_distances(
-        self, depth: int, rows: Integer[np.ndarray, " N"], hit: Bool[np.ndarray, " E"]
-    ) -> Float[np.ndarray, " N"]:
-        """Return how far the limit surface can be from faces of one flagged edge, cut in two."""
-        layer = self.layers[depth]
-        mesh, names = layer.part.topology, layer.part.names
-        edge = mesh.face_edges[rows, hit[mesh.face_edges[rows]].argmax(axis=1)]
-        middle = layer.middles[edge]
-        there = np.where((middle == NOT_THERE)[:, None], np.nan, self.places[middle])
-        return cut_distances(layer.slabs[rows], self.places[names[mesh.faces[rows]]], there)
+        return self.triangles(depth, rows).mean(axis=1)
 
     def count(self, split: Flags) -> int:
         """Return how many faces are written, of flags that are ``closed``."""
         written = self.layers[0].part.topology.face_count
-        for layer, own in zip(self.layers, split, strict=True):
-            cut = sides_of(layer.part.topology, edges_of(layer, own), np.flatnonzero(~own))
-            written += (CHILDREN - 1) * np.count_nonzero(own) + np.count_nonzero(cut)
+        for depth, own in enumerate(split):
+            rows = self.beside(depth, split)
+            new = len(self.outlines(split, depth, rows).names) - TRIANGLE * len(rows)
+            written += (CHILDREN - 1) * np.count_nonzero(own) + new
         return int(written)
+
+    def written(self, depth: int, split: Flags) -> Written:
+        """Return the faces of a level that are not split, filled where they have new vertices."""
+        layer, there = self.layers[depth], ~split[depth]
+        if depth:
+            there &= split[depth - 1][self.parents(depth, layer.part.codes)]
+        rows = np.flatnonzero(there)
+        given, distance = self.outlines(split, depth, rows), distances(layer.slabs[rows])
+        own, places, _ = self.filled(depth, rows, given)
+        cut = np.flatnonzero(np.diff(given.offsets) > TRIANGLE)
+        distance[cut] = self.distances(depth, rows[cut], given.some(cut))
+        turns, codes = layer.turns[rows[own]], layer.part.codes[rows[own]]
+        counts = np.full(len(own), TRIANGLE)
+        return Written(given.names[places], given.at[places], counts, distance[own], turns, codes)
+
+    def filled(
+        self, depth: int, rows: Integer[np.ndarray, " N"], given: Outlines
+    ) -> tuple[Integer[np.ndarray, " T"], Integer[np.ndarray, " H"], Bool[np.ndarray, " N"]]:
+        """Return triangles that fill outlines: of which one each is, and places of their corners.
+
+        Returns also which outlines could as well be filled otherwise.
+        """
+        sizes, (a, b, c) = np.diff(given.offsets), self.triangles(depth, rows).swapaxes(0, 1)
+        normals, tied = unit(cross(b - a, c - a)), np.zeros(len(rows), dtype=bool)
+        owners, pieces = list[np.ndarray](), list[np.ndarray]()
+        for size in {TRIANGLE, *sizes.tolist()}:
+            own = np.flatnonzero(sizes == size)
+            begin = given.offsets[own][:, None]
+            on = begin + np.arange(size)
+            local, tied[own] = triangles_in(
+                given.at[on], self.places[given.names[on]], normals[own]
+            )
+            owners.append(np.repeat(own, size - 2))
+            pieces.append((local + begin[:, :, None]).reshape(-1, TRIANGLE))
+        of, places = np.concatenate(owners), np.concatenate(pieces)
+        order = np.argsort(of, kind="stable")
+        return of[order], places[order].reshape(-1), tied
 
 
 def edges_of(layer: Layer, split: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " E"]:
     """Return which edges are sides of split faces."""
     mesh = layer.part.topology
-    return marked(mesh.face_edges[split], len(mesh.edges))
+    own = np.repeat(split, np.diff(mesh.offsets))
+    return marked(mesh.corner_edges[own], len(mesh.edges))
 
 
 def sides_of(
     mesh: Topology, flags: Bool[np.ndarray, " E"], rows: Integer[np.ndarray, " N"]
 ) -> Integer[np.ndarray, " N"]:
-    """Return how many sides of some faces are flagged edges."""
+    """Return how many sides of some triangles are flagged edges."""
     made = np.empty(len(rows), dtype=np.int8)
     kernels.count_sides(mesh.corner_edges, flags, rows, made)
     return made
+
+
+def after(mesh: Topology, corners: Integer[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
+    """Return the next corners of the same faces."""
+    faces = mesh.face_of(corners).astype(np.int64)
+    return np.where(corners + 1 == mesh.offsets[faces + 1], mesh.offsets[faces], corners + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +387,7 @@ class Start:
             if finer is None or not split.any():
                 break
             part = finer
-        return self.tree(layers, places)
+        return self.tree(layers, places, self.goal.angle is not None)
 
     def _no_middles(self, part: Part) -> Integer[np.ndarray, " E"]:
         return np.full(len(part.topology.edges), NOT_THERE, dtype=np.int64)

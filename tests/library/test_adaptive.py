@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from pns_common import Creases, Mesh, MeshError, ParameterError, load_model, loop, pns, refine
 from pns_common.adaptive.certificate import slabs
+from pns_common.adaptive.outlines import triangles_in
 from pns_common.adaptive.parts import Levels, Part
 from pns_common.mesh.rows import unit
 from pns_common.mesh.topology import EdgeClass
@@ -142,17 +143,15 @@ def test_no_patch_is_farther_beyond_a_side_than_said(name, enough):
 
 
 def heights(made, points, row):
-    """Return distances of points from the plane of a face; if that is a half, of those over it."""
+    """Return distances of points from the plane of a face; if that is a piece, of those over it."""
     a, b, c = made.mesh.vertices[made.mesh.faces[row]]
     normal = np.cross(b - a, c - a)
     away = np.abs((points - a) @ normal) / max(np.linalg.norm(normal), 1e-300)
-    if np.linalg.det(made.weights[row]) > 0.75 * 4.0 ** -made.face_levels[row]:
+    same = (made.codes == made.codes[row]) & (made.face_levels == made.face_levels[row])
+    if same.sum() == 1:
         return away
-    # The first half is (a, m, c), the second one (m, b, c), of the face (a, b, c).
-    first = made.face_parents[row - 1] != made.face_parents[row]
-    first |= (made.weights[row - 1][[1, 2]] != made.weights[row][[0, 2]]).any()
-    other = made.mesh.vertices[made.mesh.faces[row + 1 if first else row - 1]]
-    whole = np.stack([a, other[1], c] if first else [other[0], b, c])
+    at, places = made.at.reshape(-1, 3)[same], made.mesh.vertices[made.mesh.faces[same]]
+    whole = np.stack([places[at == k][0] for k in range(3)])
     up = np.cross(whole[1] - whole[0], whole[2] - whole[0])
     inside = np.linalg.solve(np.column_stack([b - a, c - a, up]), (points - a).T)[:2].T
     return away[(inside >= 0).all(axis=1) & (inside.sum(axis=1) <= 1)]
@@ -237,6 +236,36 @@ def test_a_cube_stays_as_it_is(goal):
     made = refine(Mesh(points, faces), "pns", **goal)
     assert made.mesh.face_count == len(faces)
     np.testing.assert_array_equal(made.mesh.faces, faces)
+
+
+def test_faces_take_vertices_of_any_level_on_their_sides():
+    points, faces = grid(13, lambda x, y: np.where(x > 0.5, (x - 0.5) * 2, 0.0) * np.cos(3 * y))
+    made = refine(Mesh(points, faces), "loop", border="corners", tolerance="0.02%")
+    assert (made.at * 2 % 1 > 0).any()
+    # Pieces fill their faces.
+    areas = np.abs(np.linalg.det(made.weights))
+    np.testing.assert_allclose(np.bincount(made.face_parents, areas), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("at", "tied"),
+    [
+        ([0, 0.25, 0.5, 1, 2], False),
+        ([0, 0.5, 1, 1.5, 2, 2.5], False),
+        ([0, 0.5, 1, 1.5, 2], True),
+        ([0, 0.5, 0.75, 1, 1.5, 2, 2.125], False),
+    ],
+)
+def test_outlines_are_filled_by_triangles_of_some_area(at, tied):
+    at, corners = np.array([at]), np.array([[0, 0, 0], [2, 0, 0], [1, 1.5, 0]])
+    side, along = at.astype(int), (at % 1)[:, :, None]
+    points = (1 - along) * corners[side % 3] + along * corners[(side + 1) % 3]
+    made, found = triangles_in(at, points, np.array([[0.0, 0.0, 1.0]]))
+    a, b, c = points[0, made[0]].swapaxes(0, 1)
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(1.5)
+    assert found.tolist() == [tied]
 
 
 def test_a_rim_of_creases_is_as_near_as_its_faces_say():
