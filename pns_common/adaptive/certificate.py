@@ -89,13 +89,13 @@ def net_of_quartics() -> Float[np.ndarray, "12 N"]:
     return np.ascontiguousarray(np.unique(np.rint(384 * np.array(made)), axis=0).T) / 384
 
 
-def folded(part: Part) -> Bool[np.ndarray, "F 3"]:
-    """Return the sides of faces beyond which no neighbour's slab bounds what reaches over them."""
+def folded(part: Part) -> Bool[np.ndarray, " E"]:
+    """Return the edges beyond which no neighbour's slab bounds what reaches over them."""
     mesh = part.topology
     rim = (mesh.edge_class == connectivity.BOUNDARY) | (mesh.edge_class == connectivity.IRREGULAR)
     # Creases are edges between two faces there.
     turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
-    return (rim | turned)[mesh.face_edges]
+    return rim | turned
 
 
 def distances(slabs: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.adaptive.quad_certificate import ragged
-from pns_common.mesh.rows import cross, dot
+from pns_common.mesh.rows import cross, dot, ragged
 from pns_common.mesh.topology import TRIANGLE
 
 # Shapes of triangles that differ by less are equal: networks compute in single precision.

@@ -9,13 +9,13 @@ import numpy as np
 from jaxtyping import Float, Integer
 
 from pns_common.adaptive.polygons import PolygonStart, PolygonTree
-from pns_common.adaptive.quad_certificate import QUAD, ragged
+from pns_common.adaptive.quad_certificate import QUAD
 from pns_common.adaptive.refine import AdaptiveRefinement, Trail, start_of, tree_of
 from pns_common.adaptive.tree import Goal
 from pns_common.errors import MeshError
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh
-from pns_common.mesh.rows import marked
+from pns_common.mesh.rows import marked, ragged
 from pns_common.mesh.topology import following
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pns_common.adaptive.certificate import FOLD, HIGH, LOW, SIDE
+from pns_common.adaptive.certificate import HIGH, LOW, SIDE
 from pns_common.adaptive.outlines import Outlines, Written
 from pns_common.adaptive.parts import CHILDREN, Part
 from pns_common.adaptive.quad_certificate import (
@@ -27,12 +27,10 @@ from pns_common.adaptive.quad_certificate import (
     lines,
     near_enough,
     planes,
-    ragged,
 )
 from pns_common.adaptive.tree import Flags, Measures, Start, Tree, edges_of
 from pns_common.kernels import connectivity
-from pns_common.mesh.creases import edge_cosines
-from pns_common.mesh.rows import dot, marked
+from pns_common.mesh.rows import dot, marked, ragged
 from pns_common.mesh.topology import TRIANGLE, Topology, following
 
 # Of two faces at a side, that which is farther from its patch is split for the side; both if equal.
@@ -214,6 +212,7 @@ class PolygonStart(Start):
         places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         rows: Integer[np.ndarray, " N"],
+        folds: Bool[np.ndarray, " E"],
         to: Measures,
     ) -> None:
         (errors, slabs, turns), new = to, rows
@@ -234,7 +233,7 @@ class PolygonStart(Start):
         flat = np.maximum(
             slabs[rows, HIGH] - heights.min(axis=1), heights.max(axis=1) - slabs[rows, LOW]
         )
-        sides = self._side_distances(part, places, finer, rows, flat, frames, steps, asked)
+        sides = self._side_distances(part, places, finer, rows, flat, frames, steps, asked, folds)
         slabs[new, SIDE] = sides[new]
         distance = np.maximum(flat[fresh], slabs[new, SIDE])
         errors[new] = self.goal.errors(distance, turns[new], points[fresh])
@@ -249,13 +248,13 @@ class PolygonStart(Start):
         frames: Float[np.ndarray, "N 6"],
         steps: int,
         wanted: Bool[np.ndarray, " F"],
+        folds: Bool[np.ndarray, " E"],
     ) -> Float[np.ndarray, " F"]:
         """Return how far sides can be from their curves, beyond which no slab bounds these."""
         mesh, distance = part.topology, np.zeros(part.topology.face_count)
         rim = mesh.edge_class == connectivity.BOUNDARY
         rim |= mesh.edge_class == connectivity.IRREGULAR
-        turned = edge_cosines(part.points, mesh.without_creases()) < FOLD
-        asked = (rim | turned)[mesh.corner_edges]
+        asked = folds[mesh.corner_edges]
         owner = mesh.face_of(np.arange(len(mesh.corners))).astype(np.int64)
         asked &= wanted[owner]
         corners = np.flatnonzero(asked)

@@ -16,7 +16,7 @@ from jaxtyping import Float, Integer
 from pns_common.adaptive.parts import CHILDREN, Levels, Part
 from pns_common.kernels import connectivity
 from pns_common.kernels import quad_flatness as kernels
-from pns_common.mesh.rows import cross, dot, marked, unit
+from pns_common.mesh.rows import cross, dot, marked, ragged, unit
 from pns_common.mesh.topology import NO_WEIGHTS
 
 # Control points are tried so many levels later, until they are near enough, or FAR from it.
@@ -119,16 +119,6 @@ def near_enough(
         else:
             made[some] = np.minimum(made[some], later)
     return made
-
-
-def ragged(
-    offsets: Integer[np.ndarray, " N1"], rows: Integer[np.ndarray, " K"]
-) -> tuple[Integer[np.ndarray, " M"], Integer[np.ndarray, " K1"]]:
-    """Return the places of some rows of ragged rows, and where each then begins."""
-    counts = np.diff(offsets)[rows]
-    made = np.append(0, np.cumsum(counts))
-    at: Integer[np.ndarray, " M"] = np.repeat(offsets[rows] - made[:-1], counts)
-    return at + np.arange(int(made[-1])), made
 
 
 def planes(

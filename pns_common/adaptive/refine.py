@@ -322,9 +322,9 @@ def _with_so_many(start: Start, shares: Shares) -> Tree:
     order, errors = _worst_first(tree)
     ends = _ends_of_ties(errors)
     shares.part(GROWN, CHOSEN)
-    chosen, count = _as_many(tree, order, ends, most, shares)
+    chosen, count = _as_many(tree, order, ends, most, made, shares)
     if count < ENOUGH * most and len(ends) < len(order):
-        chosen, _ = _as_many(tree, order, np.arange(1, len(order) + 1), most, shares)
+        chosen, _ = _as_many(tree, order, np.arange(1, len(order) + 1), most, made, shares)
     shares.part(CHOSEN, 1.0)
     forced, known = tree.codes(tree.closed(_flagged(tree, order[:chosen]))), tree.measured
     del tree
@@ -336,19 +336,19 @@ def _as_many(
     order: Integer[np.ndarray, "N 2"],
     ends: Integer[np.ndarray, " M"],
     most: int,
+    made_by_all: int,
     shares: Shares,
 ) -> tuple[int, int]:
     """Return the largest of some numbers of first splits that makes so many faces at most.
 
-    0 is one of them. Returns also how many faces it makes.
+    0 is one of them. Returns also how many faces it makes; all make ``made_by_all``.
     """
 
     def count(number: int) -> int:
-        splits = order[: ends[number - 1]] if number else order[:0]
-        return tree.count(tree.closed(_flagged(tree, splits)))
+        return tree.count(tree.closed(_flagged(tree, order[: ends[number - 1]])))
 
     low, fewer, turn = 0, tree.layers[0].part.topology.face_count, 0
-    high, more = len(ends), count(len(ends))
+    high, more = len(ends), made_by_all
     if more <= most:
         low, fewer = high, more
     while high - low > 1:

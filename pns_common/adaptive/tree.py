@@ -25,10 +25,9 @@ from pns_common.adaptive.parts import (
     Settled,
     rows_of_faces,
 )
-from pns_common.adaptive.quad_certificate import ragged
 from pns_common.adaptive.turning import chord, turns
 from pns_common.kernels import connectivity as kernels
-from pns_common.mesh.rows import cross, marked, unit
+from pns_common.mesh.rows import cross, marked, ragged, unit
 from pns_common.mesh.topology import TRIANGLE, Topology
 
 # Faces that are measured between two reports of progress.
@@ -152,11 +151,11 @@ class Tree:
                 None: any.
         """
         made, more, ties = [own.copy() for own in split], True, False
+        if widest is None and not self.middles_only:
+            return made
         while more or not ties:
             more, ties = False, not more
             for depth in reversed(range(len(made))):
-                if widest is None and not self.middles_only:
-                    continue
                 rows = self.beside(depth, made)
                 given = self.outlines(made, depth, rows)
                 far = np.zeros(len(rows), dtype=bool)
@@ -426,9 +425,12 @@ class Start:
             if same.any():
                 yield rows[same]
             rows = rows[~same]
+        if len(rows) == 0:
+            return
+        folds = folded(part)
         for begin in range(0, len(rows), self.together):
             some = rows[begin : begin + self.together]
-            self._measure_some(part, places, finer, some, to)
+            self._measure_some(part, places, finer, some, folds, to)
             yield some
 
     def _measure_some(
@@ -437,13 +439,15 @@ class Start:
         places: Float[np.ndarray, "P 3"],
         finer: Part | None,
         rows: Integer[np.ndarray, " N"],
+        folds: Bool[np.ndarray, " E"],
         to: Measures,
     ) -> None:
-        """Write errors, slabs and turns of some faces that exist."""
+        """Write errors, slabs and turns of some faces that exist; edges in ``folds`` are folded."""
         errors, widths, turned = to
         triangles, deeper = places[part.names[part.topology.faces[rows]]], finer is not None
         of_finer = CHILDREN * rows[:, None] + np.arange(CHILDREN) if deeper else rows
-        asked = triangles, folded(part)[rows], self.levels, int(deeper), self.goal.tolerance or 0.0
+        sides, enough = folds[part.topology.face_edges[rows]], self.goal.tolerance or 0.0
+        asked = triangles, sides, self.levels, int(deeper), enough
         widths[rows] = slabs(finer or part, of_finer, *asked)
         if self.goal.angle is not None:
             turned[rows] = turns(part, finer, rows, self.levels)

@@ -87,6 +87,14 @@ def ranges(
     return np.repeat(first - step * before, counts) + step * np.arange(int(counts.sum()))
 
 
+def ragged(
+    offsets: Integer[np.ndarray, " N1"], rows: Integer[np.ndarray, " K"]
+) -> tuple[Integer[np.ndarray, " M"], Integer[np.ndarray, " K1"]]:
+    """Return the places of some rows of ragged rows, and where each then begins."""
+    counts = np.diff(offsets)[rows]
+    return ranges(offsets[rows], counts), np.append(0, np.cumsum(counts))
+
+
 def extent(
     points: Float[np.ndarray, "N K"],
 ) -> tuple[Float[np.ndarray, " K"], Float[np.ndarray, " K"]]:
