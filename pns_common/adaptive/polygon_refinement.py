@@ -8,19 +8,17 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Integer
 
-from pns_common.adaptive.polygons import PolygonStart, PolygonTree
+from pns_common.adaptive.polygons import PolygonStart
 from pns_common.adaptive.quad_certificate import QUAD
-from pns_common.adaptive.refine import AdaptiveRefinement, Trail, start_of, tree_of
+from pns_common.adaptive.refine import AdaptiveRefinement, start_of, written
 from pns_common.adaptive.tree import Goal
 from pns_common.errors import MeshError
 from pns_common.mesh.creases import Creases
-from pns_common.mesh.mesh import Mesh
-from pns_common.mesh.rows import marked, ragged
 from pns_common.mesh.topology import following
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.progress import Shares
-from pns_common.refined import Step, check_coordinates
+from pns_common.refined import Step
 
 # Where the corners of a quad are in it.
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -124,51 +122,4 @@ def refine_polygons(
 ) -> PolygonRefinement:
     """Refine a mesh of polygons to a goal; arguments as of ``refine_to_goal``."""
     start = start_of(PolygonStart, level, first, scheme, creases, goal, deepest, shares)
-    tree = tree_of(start, shares)
-    assert isinstance(tree, PolygonTree)
-    made = [tree.written(depth, tree.split) for depth in range(len(tree.layers))]
-    # In the order of control faces, and of children in each.
-    begins = [
-        level.topology.offsets[made[0].codes].astype(np.int64),
-        *(own.codes for own in made[1:]),
-    ]
-    keys = [own * 4 ** (deepest - max(depth, 1)) for depth, own in enumerate(begins)]
-    order = np.argsort(np.concatenate(keys), kind="stable")
-    names, at, counts, distances, codes = (
-        np.concatenate([getattr(own, name) for own in made])
-        for name in ("names", "at", "counts", "distances", "codes")
-    )
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
-    places, offsets = ragged(starts, order)
-    names, at = names[places], at[places]
-    used = marked(names, len(tree.places))
-    used[: len(level.points)] = True
-    rows, number = np.flatnonzero(used), np.cumsum(used) - 1
-    settled = [list(layer.settled) for layer in tree.layers]
-    # The control mesh's vertices and the first new ones end there together, a level later.
-    settled = [[], settled[0] + (settled[1] if len(settled) > 1 else []), *settled[2:]]
-    points = tree.places[rows]
-    check_coordinates(points, start.levels.blocks)
-    nothing = np.broadcast_to(0.0, len(rows))
-    return PolygonRefinement(
-        mesh=Mesh.of_refined(points, number[names], offsets),
-        ratio=nothing,
-        gate=nothing,
-        steps=[first],
-        scheme=scheme,
-        surface=None,
-        codes=codes[order],
-        face_levels=depths,
-        distances=distances[order],
-        angles=np.zeros(len(order)),
-        goal=goal,
-        trail=Trail(
-            [layer.step for layer in tree.layers if layer.step is not None],
-            settled,
-            rows,
-            start.levels,
-        ),
-        control=level,
-        at=at,
-    )
+    return written(PolygonRefinement, start, shares, level, first, scheme)

@@ -104,6 +104,13 @@ class PolygonTree(Tree):
         hit = edges_of(layer, split[depth])[mesh.corner_edges]
         return np.add.reduceat(hit, mesh.offsets[:-1], dtype=np.int64)
 
+    def order_of(
+        self, depth: int, codes: Integer[np.ndarray, " N"], deepest: int
+    ) -> Integer[np.ndarray, " N"]:
+        """Return numbers of faces of a level, in the order of their parents."""
+        own = codes if depth else self.layers[0].part.topology.offsets[codes].astype(np.int64)
+        return own * CHILDREN ** (deepest - max(depth, 1))
+
     def middles_of(self, depth: int, rows: Integer[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
         """Return the middles of faces."""
         return self.frames(depth, rows)[:, :3]

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Integer
@@ -24,7 +24,7 @@ from pns_common.adaptive.turning import degrees
 from pns_common.errors import MeshError, ParameterError
 from pns_common.mesh.creases import Creases
 from pns_common.mesh.mesh import Mesh
-from pns_common.mesh.rows import marked
+from pns_common.mesh.rows import marked, ragged
 from pns_common.operator.level import Level
 from pns_common.operator.scheme import Scheme
 from pns_common.parameters import is_number, is_whole
@@ -235,6 +235,9 @@ class AdaptiveRefinement(Refinement):
         }
 
 
+Made = TypeVar("Made", bound=AdaptiveRefinement)
+
+
 def refine_to_goal(
     level: Level,
     first: Step | None,
@@ -255,7 +258,7 @@ def refine_to_goal(
         shares: what reports progress.
     """
     start = start_of(Start, level, first, scheme, creases, goal, deepest, shares)
-    return _written(tree_of(start, shares), level, first, scheme, start.levels, goal)
+    return written(AdaptiveRefinement, start, shares, level, first, scheme)
 
 
 def start_of(
@@ -421,21 +424,21 @@ def _same(one: Flags, other: Flags) -> bool:
 # --- writing --------------------------------------------------------------------------------------
 
 
-def _written(
-    tree: Tree, level: Level, first: Step | None, scheme: Scheme, levels: Levels, goal: Goal
-) -> AdaptiveRefinement:
-    """Return the refinement of a tree whose faces can be cut to meet."""
+def written(
+    kind: type[Made], start: Start, shares: Shares, level: Level, first: Step | None, scheme: Scheme
+) -> Made:
+    """Grow the tree of a start, and return its refinement; arguments as of ``refine_to_goal``."""
+    tree, levels = tree_of(start, shares), start.levels
     made = [tree.written(depth, tree.split) for depth in range(len(tree.layers))]
-    keys = [own.codes * 4 ** (levels.deepest - depth) for depth, own in enumerate(made)]
+    # In the order of control faces, and of children in each.
+    keys = [tree.order_of(depth, own.codes, levels.deepest) for depth, own in enumerate(made)]
     order = np.argsort(np.concatenate(keys), kind="stable")
-    distance, turned, codes = (
-        np.concatenate([getattr(own, name) for own in made])[order]
-        for name in ("distances", "turns", "codes")
+    names, at, counts, distance, turned, codes = (
+        np.concatenate([getattr(own, name) for own in made])
+        for name in ("names", "at", "counts", "distances", "turns", "codes")
     )
-    names, at = (
-        np.concatenate([getattr(own, name) for own in made]).reshape(-1, 3)[order]
-        for name in ("names", "at")
-    )
+    places, offsets = ragged(np.append(0, np.cumsum(counts)), order)
+    names, at = names[places], at[places]
     depths = np.repeat(np.arange(len(made)), [len(own.codes) for own in made])[order]
     used = marked(names, len(tree.places))
     used[: len(level.points)] = True
@@ -446,22 +449,24 @@ def _written(
         after = settled[1] if len(settled) > 1 else []
         settled = [[], settled[0] + after, *settled[2:]]
     steps = [layer.step for layer in tree.layers if layer.step is not None]
-    points = tree.places[rows]
+    points, corners = tree.places[rows], number[names]
     check_coordinates(points, levels.blocks)
     nothing = np.broadcast_to(0.0, len(rows))
-    return AdaptiveRefinement(
-        mesh=Mesh.of_refined(points, number[names]),
+    return kind(
+        mesh=Mesh.of_refined(points, corners, offsets)
+        if scheme.base.polygons
+        else Mesh.of_refined(points, corners.reshape(-1, 3)),
         ratio=nothing,
         gate=nothing,
         steps=[] if first is None else [first],
         scheme=scheme,
         surface=None,
-        codes=codes,
-        at=at.reshape(-1),
+        codes=codes[order],
+        at=at,
         face_levels=depths,
-        distances=distance,
-        angles=degrees(turned),
-        goal=goal,
+        distances=distance[order],
+        angles=degrees(turned[order]),
+        goal=start.goal,
         trail=Trail(steps, settled, rows, levels),
         control=level,
     )

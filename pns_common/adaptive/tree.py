@@ -241,6 +241,12 @@ class Tree:
         """Return the rows of the parents of faces of a level in the level before."""
         return np.searchsorted(self.layers[depth - 1].part.codes, codes // CHILDREN)
 
+    def order_of(
+        self, depth: int, codes: Integer[np.ndarray, " N"], deepest: int
+    ) -> Integer[np.ndarray, " N"]:
+        """Return numbers of faces of a level, in the order of their parents."""
+        return codes * CHILDREN ** (deepest - depth)
+
     def middles_of(self, depth: int, rows: Integer[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
         """Return the middles of faces."""
         return self.triangles(depth, rows).mean(axis=1)
