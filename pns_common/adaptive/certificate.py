@@ -18,7 +18,7 @@ from pns_common.adaptive.parts import CHILD_WEIGHTS, CHILDREN, Levels, Part
 from pns_common.kernels import connectivity
 from pns_common.kernels import flatness as kernels
 from pns_common.mesh.creases import edge_cosines
-from pns_common.mesh.rows import cross, dot, marked, unit
+from pns_common.mesh.rows import cross, dot, marked, ranges, unit
 from pns_common.schemes.loop_weights import beta
 
 # The side of a face that each side of its children is half of, from (a, ab, ca) on, or NO_SIDE.
@@ -179,7 +179,7 @@ def _hulls(
     flat = corners.reshape(-1).astype(np.int64)
     begin, end = (np.searchsorted(ends[:, 0], flat, side=side) for side in ("left", "right"))
     counts = end - begin
-    at = np.repeat(begin - np.cumsum(counts) + counts, counts) + np.arange(int(counts.sum()))
+    at = ranges(begin, counts)
     face = np.repeat(np.arange(len(flat)) // 3, counts)
     to = part.points[ends[at, 1]] - triangles[face, 0]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -21,6 +21,7 @@ from pns_common.carry.charts import chart_points, refine_charts
 from pns_common.carry.columns import level_topologies
 from pns_common.carry.descendants import copied_corners, corner_weights, cut_quads
 from pns_common.mesh.creases import NO_CREASES, Creases
+from pns_common.mesh.rows import ranges
 from pns_common.mesh.topology import NO_WEIGHTS, Topology, following
 from pns_common.parallel import Blocks, available_threads
 from pns_common.schemes import BaseScheme
@@ -314,7 +315,7 @@ def several_levels(
     source = kept.source.reshape(-1, 3)
     begin, end = (np.searchsorted(parents, source[:, 0] // 3, side=s) for s in ("left", "right"))
     counts = end - begin
-    own = np.repeat(begin - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
+    own = ranges(begin, counts)
     order, over = (np.repeat(each, counts, axis=0) for each in (source % 3, kept.turned))
     weights, vertices = np.take_along_axis(weights[own], order[:, None], axis=2), faces[own]
     # A copy that faces the other way takes the corners backwards.
